@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/index.h"
 #include "core/stopwatch.h"
 #include "loopclosure/detector/detector_file.h"
 #include "loopclosure/detector/detector_state.h"
@@ -230,7 +231,7 @@ std::size_t LoopDetector::NumLocations() const {
   return memory.short_term_memory().size() + memory.working_memory().size();
 }
 std::size_t LoopDetector::NumLongTerm() const {
-  return static_cast<std::size_t>(impl_->state().memory().num_long_term());
+  return internal::Index(impl_->state().memory().num_long_term());
 }
 std::int64_t LoopDetector::LastId() const { return impl_->state().last_id(); }
 const LoopDetectorOptions& LoopDetector::options() const { return impl_->state().options(); }

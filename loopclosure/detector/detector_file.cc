@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/index.h"
 #include "core/parallel.h"
 #include "core/state_archive.h"
 #include "tutti/core/error.h"
@@ -123,7 +124,7 @@ void SavedDetector::LoadInto(DetectorState& state, LongTermMemory& long_term) {
   std::vector<std::string> vocabularies;
   for (std::size_t m = 0; m < members.size(); ++m) vocabularies.push_back(in_.Expect(Section::kMember));
   RunParallel(static_cast<int>(members.size()), state.options().threads, [&](int member) {
-    const auto m = static_cast<std::size_t>(member);
+    const auto m = Index(member);
     ReadStateBytes(vocabularies[m], in_.name(),
                    Vocabulary::Beside{&members[m].vocabulary(), DescriptorsOf(m, in_order)});
   });

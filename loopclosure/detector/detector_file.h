@@ -25,7 +25,7 @@ void SaveDetector(DetectorState& state, LongTermMemory& long_term, const std::fi
 /// Whether the positions that came with queries (PosePrior) are kept: they mean nothing without the odometry
 /// that gave them.
 enum class Positions { kForget, kKeep };
-/// The same as sections of a file that holds more.
+/// Gives what it would write as sections of a file that holds more.
 void SaveDetector(DetectorState& state, LongTermMemory& long_term, Positions positions,
                   const SectionSink& out);
 

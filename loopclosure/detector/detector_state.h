@@ -32,7 +32,7 @@ class DetectorState {
   const PlaceReasoner& reasoner() const { return reasoner_; }
   /// All locations: those of the shared memory, or what is in any member's.
   const LocationMemory& memory() const { return reasoner_.memory(); }
-  /// Of the newest query, -1 if there was none.
+  /// Id of the newest query, -1 if there was none.
   std::int64_t last_id() const { return last_id_; }
   const CallersDescriptors& callers_descriptors() const { return callers_descriptors_; }
 

@@ -23,7 +23,6 @@ std::vector<Member> MembersOf(const LoopDetectorOptions& options) {
   return members;
 }
 
-// Of a dense member.
 SeenWords Described(const Features& features) {
   SeenWords seen;
   seen.descriptor = NormalisedDescriptor(features.descriptors);

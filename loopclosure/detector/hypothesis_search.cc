@@ -133,7 +133,7 @@ Verification HypothesisSearch::WithMatches(int query, const Verification& verifi
   return full;
 }
 
-// Of the places that geometry finds similar the most probable, and of its views the nearest.
+// Chooses the most probable of the places that geometry finds similar, and the nearest of its views.
 void HypothesisSearch::Decide(const View& query, const Belief& belief, LoopResult& result) const {
   constexpr double kWorthASearch = 0.5;  // probability: below, no other view of the place makes it a loop
   Weigh(belief, result);
@@ -158,7 +158,7 @@ void HypothesisSearch::Decide(const View& query, const Belief& belief, LoopResul
     result.verification = *Tried(memory_.Find(found.candidate), result);
 }
 
-// Of what geometry finds similar, with its probability; null and -1 if it finds nothing.
+// What geometry finds similar, with its probability; null and -1 if it finds nothing.
 std::pair<const Verification*, double> HypothesisSearch::MostProbable(const LoopResult& result) {
   std::pair<const Verification*, double> most(nullptr, -1);
   for (const Verification& tried : result.tried) {
@@ -169,7 +169,7 @@ std::pair<const Verification*, double> HypothesisSearch::MostProbable(const Loop
   return most;
 }
 
-// The same as Try, but what was tried at first has no matches any more: they are found again.
+// Does what Try does, but what was tried at first has no matches any more: they are found again.
 const Verification& HypothesisSearch::TryWithMatches(const View& query, int candidate,
                                                      LoopResult& result) const {
   const Verification& tried = Try(query, candidate, result);

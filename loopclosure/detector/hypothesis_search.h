@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/index.h"
 #include "loopclosure/geometry/verification.h"
 #include "loopclosure/memory/belief.h"
 #include "loopclosure/memory/location_memory.h"
@@ -24,11 +25,11 @@ class HypothesisSearch {
 
   /// Fills verification, tried, accepted and reason of `result`.
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
-  /// The same of the location `query`, with a belief that came later: adds what was not tried before.
+  /// Does so for the location `query`, with a belief that came later: adds what was not tried before.
   void VerifyMore(int query, const Belief& belief, LoopResult& result) const;
   /// Only the probability of what was chosen, with a belief that came later.
   void Reconsider(const Belief& belief, LoopResult& result) const;
-  /// The same verification of the location `query`, with its matches.
+  /// This verification of the location `query`, with its matches.
   Verification WithMatches(int query, const Verification& verification) const;
 
  private:
@@ -57,7 +58,7 @@ double MassAround(const Belief& belief, int slot, const LocationMemory& memory);
 
 /// 0 for a place that the belief does not reach.
 inline double PosteriorAt(const Belief& belief, int slot) {
-  const std::size_t i = static_cast<std::size_t>(slot);
+  const std::size_t i = Index(slot);
   return i < belief.places.size() ? belief.places[i] : 0.0;
 }
 

@@ -63,10 +63,8 @@ class PlaceReasoner {
   /// All locations: those of the shared memory, or what is in any member's.
   const LocationMemory& memory() const { return Shared() ? systems_.front()->memory() : union_; }
   bool Shared() const { return systems_.size() == 1; }
-  std::vector<std::unique_ptr<MemorySystem>>& systems() { return systems_; }
   const std::vector<std::unique_ptr<MemorySystem>>& systems() const { return systems_; }
   LocationMemory& union_of_all() { return union_; }
-  const LocationMemory& union_of_all() const { return union_; }
   /// True if some memory has the slot in STM or WM.
   bool InMemory(int slot) const;
   /// What must be the same for stored locations to be of use.
@@ -74,11 +72,9 @@ class PlaceReasoner {
 
   /// Where the locations were taken.
   PoseTrack& track() { return track_; }
-  const PoseTrack& track() const { return track_; }
 
   /// What is kept for second words.
   SecondWord& second_word() { return second_word_; }
-  const SecondWord& second_word() const { return second_word_; }
 
   /// Running figures: all but memories, filters, track and second words.
   template <class Archive>

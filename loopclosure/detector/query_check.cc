@@ -1,3 +1,4 @@
+#include "core/index.h"
 #include "loopclosure/detector/ensemble.h"
 
 #include <algorithm>
@@ -45,10 +46,10 @@ void CheckRegions(const LoopQuery& query, const std::string& which) {
   }
 }
 
-// As many descriptors as keypoints, and those where pixels can be.
+// There must be as many descriptors as keypoints, and these where pixels can be.
 void CheckKeypoints(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& descriptors,
                     const std::string& which) {
-  if (static_cast<std::size_t>(descriptors.rows) != keypoints.size()) {
+  if (Index(descriptors.rows) != keypoints.size()) {
     throw InputError(which + std::to_string(keypoints.size()) + " keypoints but " +
                      std::to_string(descriptors.rows) + " descriptor rows");
   }

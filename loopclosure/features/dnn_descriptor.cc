@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "core/index.h"
 #include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -124,7 +125,7 @@ bool IsVector(const cv::Mat& values) {
   if (values.dims < 1 || values.total() < 2) return false;
   int longest = 0;
   for (int d = 0; d < values.dims; ++d) longest = std::max(longest, values.size[d]);
-  return static_cast<std::size_t>(longest) == values.total();
+  return internal::Index(longest) == values.total();
 }
 
 // Blue, green, red, 8 bit.
@@ -147,7 +148,7 @@ cv::Mat MakeBlob(const cv::Mat& colour, const DnnOptions& options) {
     cv::Mat plane(colour.rows, colour.cols, CV_32F, blob.ptr<float>(0, c));
     cv::Mat channel;
     cv::extractChannel(colour, channel, options.swap_rb ? 2 - c : c);
-    const auto i = static_cast<std::size_t>(c);
+    const auto i = internal::Index(c);
     const double factor = options.scale / options.stddev[i];
     channel.convertTo(plane, CV_32F, factor, -options.mean[i] * factor);
   }

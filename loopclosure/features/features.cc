@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
+#include "core/index.h"
 #include "loopclosure/features/orb.h"
 #include "loopclosure/features/sift.h"
 #include "loopclosure/features/smoothing.h"
@@ -38,11 +39,11 @@ std::vector<cv::KeyPoint> Picked(const std::vector<cv::KeyPoint>& keypoints,
                                  const std::vector<int>& selected) {
   std::vector<cv::KeyPoint> picked;
   picked.reserve(selected.size());
-  for (const int i : selected) picked.push_back(keypoints[static_cast<std::size_t>(i)]);
+  for (const int i : selected) picked.push_back(keypoints[internal::Index(i)]);
   return picked;
 }
 
-// Of keypoints in order of strength, those that reach the threshold, or as many as are wanted.
+// Keeps, of keypoints in order of strength, those that reach the threshold, or as many as are wanted.
 void DropWeak(double threshold, int wanted, std::vector<cv::KeyPoint>& keypoints) {
   while (static_cast<int>(keypoints.size()) > wanted &&
          static_cast<double>(keypoints.back().response) < threshold) {
@@ -71,7 +72,7 @@ std::vector<NamedFactory> Registered(const NamedFactory* added = nullptr) {
   return types;
 }
 
-// Of members that surf, sift and orb are not; null for an unknown name.
+// Factories of all members but surf, sift and orb; null for those and for an unknown name.
 FeatureFactory FactoryOf(const std::string& name) {
   std::vector<NamedFactory> types = {{"akaze", [](cv::Size, int) { return cv::AKAZE::create(); }},
                                      {"brisk", [](cv::Size, int) { return cv::BRISK::create(); }},
@@ -145,7 +146,7 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
   std::vector<int> order(keypoints.size());
   std::iota(order.begin(), order.end(), 0);
   const auto key = [&](int i) {
-    const cv::KeyPoint& k = keypoints[static_cast<std::size_t>(i)];
+    const cv::KeyPoint& k = keypoints[internal::Index(i)];
     return std::make_tuple(-k.response, k.pt.y, k.pt.x, k.size, k.angle, i);
   };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
@@ -156,15 +157,15 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
   const int cells_x = std::max(1, static_cast<int>(std::ceil(image_size.width / cell)));
   const int cells_y = std::max(1, static_cast<int>(std::ceil(image_size.height / cell)));
   const int share = std::max(1, count / (cells_x * cells_y));
-  std::vector<int> taken(static_cast<std::size_t>(cells_x * cells_y), 0);
+  std::vector<int> taken(internal::Index(cells_x * cells_y), 0);
   std::vector<bool> chosen(order.size(), false);
   int num_chosen = 0;
   for (std::size_t i = 0; i < order.size() && num_chosen < count; ++i) {
-    const cv::Point2f& p = keypoints[static_cast<std::size_t>(order[i])].pt;
+    const cv::Point2f& p = keypoints[internal::Index(order[i])].pt;
     const int x = std::clamp(static_cast<int>(p.x / cell), 0, cells_x - 1);
     const int y = std::clamp(static_cast<int>(p.y / cell), 0, cells_y - 1);
     const int at = y * cells_x + x;
-    int& used = taken[static_cast<std::size_t>(at)];
+    int& used = taken[internal::Index(at)];
     if (used >= share) continue;
     ++used;
     chosen[i] = true;

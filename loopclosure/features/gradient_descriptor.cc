@@ -1,3 +1,4 @@
+#include "core/index.h"
 #include "loopclosure/features/whole_image.h"
 
 #include <algorithm>
@@ -18,7 +19,7 @@ using Histograms = std::vector<float>;  // by cell, then by direction
 
 float& At(Histograms& histograms, int row, int column, int bin) {
   const int at = (row * kColumns + column) * kBins + bin;
-  return histograms[static_cast<std::size_t>(at)];
+  return histograms[internal::Index(at)];
 }
 
 // A pixel's gradient goes into the two next directions and the four next cells, each by its nearness.
@@ -88,7 +89,7 @@ cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask) {
   cv::Mat dx, dy;
   cv::Sobel(small, dx, CV_32F, 1, 0, 1);
   cv::Sobel(small, dy, CV_32F, 0, 1, 1);
-  Histograms histograms(static_cast<std::size_t>(kColumns * kRows * kBins), 0.0f);
+  Histograms histograms(internal::Index(kColumns * kRows * kBins), 0.0f);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       const float gx = dx.at<float>(y, x), gy = dy.at<float>(y, x);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/clones.h"
+#include "core/index.h"
 #include "core/sanitized_range.h"
 
 namespace tutti::internal {
@@ -35,10 +36,10 @@ TUTTI_CLONES("avx2")
 TUTTI_CHECKED_AS_A_WHOLE void SymmetricSum(const float* const* left, const float* const* right,
                                            const float* kernel, std::size_t taps, int count, float* out) {
   for (std::size_t i = 0; i < taps; ++i) {
-    CheckReadable(left[i], static_cast<std::size_t>(count));
-    CheckReadable(right[i], static_cast<std::size_t>(count));
+    CheckReadable(left[i], Index(count));
+    CheckReadable(right[i], Index(count));
   }
-  CheckWritable(out, static_cast<std::size_t>(count));
+  CheckWritable(out, Index(count));
   int x = 0;
   for (; x + kBlock <= count; x += kBlock) {
     Eight s0, s1, s2, s3;
@@ -83,7 +84,7 @@ void GaussianBlur(const cv::Mat& from, double sigma, cv::Mat& to) {
   const std::vector<float> kernel = HalfKernel(sigma);
   const int radius = static_cast<int>(kernel.size()) - 1;
   std::vector<const float*> left(kernel.size()), right(kernel.size());
-  std::vector<float> line(static_cast<std::size_t>(from.cols + 2 * radius));  // with its mirrored ends
+  std::vector<float> line(Index(from.cols + 2 * radius));  // with its mirrored ends
   float* const begin = line.data() + radius;
   std::vector<std::pair<int, int>> mirrored;  // pixel outside, and the one inside that it shows
   for (int x = 1; x <= radius; ++x) {
@@ -93,15 +94,15 @@ void GaussianBlur(const cv::Mat& from, double sigma, cv::Mat& to) {
   }
   for (int y = 0; y < from.rows; ++y) {
     for (int i = 0; i <= radius; ++i) {
-      const auto at = static_cast<std::size_t>(i);
+      const auto at = Index(i);
       left[at] = from.ptr<float>(cv::borderInterpolate(y - i, from.rows, cv::BORDER_REFLECT_101));
       right[at] = from.ptr<float>(cv::borderInterpolate(y + i, from.rows, cv::BORDER_REFLECT_101));
     }
     SymmetricSum(left.data(), right.data(), kernel.data(), kernel.size(), from.cols, begin);
     for (const auto& [outside, inside] : mirrored) begin[outside] = begin[inside];
     for (int i = 0; i <= radius; ++i) {
-      left[static_cast<std::size_t>(i)] = begin - i;
-      right[static_cast<std::size_t>(i)] = begin + i;
+      left[Index(i)] = begin - i;
+      right[Index(i)] = begin + i;
     }
     SymmetricSum(left.data(), right.data(), kernel.data(), kernel.size(), from.cols, to.ptr<float>(y));
   }
@@ -164,7 +165,7 @@ ImageContrast ContrastOf(const cv::Mat& grey) {
       const int corners = above[x - 1] + above[x + 1] + below[x - 1] + below[x + 1];
       const int sides = above[x] + below[x] + here[x - 1] + here[x + 1];
       ++values[here[x]];
-      ++differences[static_cast<std::size_t>(std::abs(corners - 2 * sides + 4 * here[x]))];
+      ++differences[Index(std::abs(corners - 2 * sides + 4 * here[x]))];
     }
   }
   contrast.noise = Quantile(differences, 0.5) / kNormal;

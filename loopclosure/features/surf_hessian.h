@@ -6,11 +6,12 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "core/index.h"
 #include "loopclosure/features/surf_integral.h"
 
 namespace tutti::internal {
 
-/// As dlib::hessian_pyramid computes them, sum for sum; but a layer of which the octave before holds every
+/// Equal to those of dlib::hessian_pyramid, sum for sum; but a layer of which the octave before holds every
 /// value is taken from there, and a row of determinants is computed as a whole, each of its sums of integers
 /// in the order that suits vectors.
 ///
@@ -19,7 +20,7 @@ class SurfHessian {
  public:
   static constexpr int kIntervals = 4;  ///< layers of an octave
 
-  /// Of another image, in the memory of the one before.
+  /// Takes another image, in the memory of the one before.
   void Compute(const SurfIntegral& image, int octaves);
 
   int octaves() const { return octaves_; }
@@ -32,15 +33,13 @@ class SurfHessian {
 
   /// Determinants of an octave's layer, rows x columns, CV_64F; negative where the trace is.
   const cv::Mat& Layer(int octave, int interval) const {
-    return layers_[static_cast<std::size_t>(octave) * kIntervals + static_cast<std::size_t>(interval)];
+    return layers_[Index(octave) * kIntervals + Index(interval)];
   }
 
  private:
   static constexpr int kFirstStep = 2;
 
-  cv::Mat& At(int octave, int interval) {
-    return layers_[static_cast<std::size_t>(octave) * kIntervals + static_cast<std::size_t>(interval)];
-  }
+  cv::Mat& At(int octave, int interval) { return layers_[Index(octave) * kIntervals + Index(interval)]; }
   void Fill(const SurfIntegral& image, int octave, int interval);
   void CopyFromFiner(int octave, int interval, int finer_interval);
 

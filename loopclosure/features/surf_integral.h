@@ -15,7 +15,7 @@ class SurfIntegral {
  public:
   using value_type = int;
 
-  /// Of an 8-bit grey image of at most 2^23 pixels, in place of the one before.
+  /// `grey`: an 8-bit image of at most 2^23 pixels, which takes the place of the one before.
   void Compute(const cv::Mat& grey) { cv::integral(grey, sums_, CV_32S); }
 
   long nr() const { return sums_.rows - 1; }

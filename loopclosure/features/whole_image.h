@@ -33,8 +33,8 @@ class DnnDescriptor {
   /// plain image, or a side below 16 px), or the output is 0 throughout. `image`: as LoopQuery::image;
   /// `grey`: what ToGrey8 makes of it, the input in three equal channels where the image is not 8-bit colour;
   /// where `mask` (CV_8UC1 of the same size, or empty) is 0, the mean of the rest takes the pixels' place.
-  /// The same bytes for any number of threads: the network runs in the calling one. Throws InputError if a
-  /// value of the output is not a finite number.
+  /// The bytes are the same for any number of threads: the network runs in the calling one. Throws InputError
+  /// if a value of the output is not a finite number.
   cv::Mat Describe(const cv::Mat& image, const cv::Mat& grey, const cv::Mat& mask) const;
 
   /// Length of the descriptor [values], at least 2.

@@ -44,7 +44,7 @@ class AliasEvidence {
   Belief Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory, double words,
                     double repeated, double overlap);
 
-  /// The same for an image by itself, which is no location: nothing is learnt.
+  /// The likelihood of an image by itself, which is no location: nothing is learnt.
   Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory) const;
 
   /// Learns from the same image, after the filter's step: `near` are the slots of the most probable place and

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/index.h"
+
 namespace tutti {
 
 void BayesFilter::Step(const TransitionModel& transition, const std::vector<int>& working_memory,
@@ -12,20 +14,20 @@ void BayesFilter::Step(const TransitionModel& transition, const std::vector<int>
   if (!started_) {
     const double uniform = 1.0 / (static_cast<double>(working_memory.size()) + 1.0);
     posterior_.new_place = uniform;
-    for (const int slot : working_memory) posterior_.places[static_cast<std::size_t>(slot)] = uniform;
+    for (const int slot : working_memory) posterior_.places[internal::Index(slot)] = uniform;
     started_ = true;
   }
   posterior_ = transition.Predict(posterior_, working_memory);
   posterior_.new_place *= likelihood.new_place;
   for (const int slot : working_memory) {
-    const std::size_t i = static_cast<std::size_t>(slot);
+    const std::size_t i = internal::Index(slot);
     posterior_.places[i] *= likelihood.places[i];
   }
   posterior_.Normalise();
 }
 
 void BayesFilter::Forget(int slot) {
-  const std::size_t i = static_cast<std::size_t>(slot);
+  const std::size_t i = internal::Index(slot);
   if (i < posterior_.places.size()) posterior_.places[i] = 0.0;
 }
 
@@ -43,14 +45,14 @@ Belief Hindsight::Smoothed(const TransitionModel& transition, const std::vector<
     beta.new_place *= step->likelihood.new_place;
     double most = beta.new_place;
     for (const int slot : working_memory) {
-      const std::size_t i = static_cast<std::size_t>(slot);
+      const std::size_t i = internal::Index(slot);
       // What was not in working memory then could not be said to be there.
       beta.places[i] *= i < step->likelihood.places.size() ? step->likelihood.places[i] : 0.0;
       most = std::max(most, beta.places[i]);
     }
     if (!(most > 0.0)) break;
     beta.new_place /= most;
-    for (const int slot : working_memory) beta.places[static_cast<std::size_t>(slot)] /= most;
+    for (const int slot : working_memory) beta.places[internal::Index(slot)] /= most;
     beta = transition.Backward(beta, working_memory);
   }
   Belief gamma;
@@ -58,7 +60,7 @@ Belief Hindsight::Smoothed(const TransitionModel& transition, const std::vector<
   gamma.places.assign(beta.places.size(), 0.0);
   gamma.new_place = alpha.new_place * beta.new_place;
   for (const int slot : working_memory) {
-    const std::size_t i = static_cast<std::size_t>(slot);
+    const std::size_t i = internal::Index(slot);
     if (i < alpha.places.size()) gamma.places[i] = alpha.places[i] * beta.places[i];
   }
   gamma.Normalise();
@@ -71,7 +73,7 @@ void Hindsight::Check(int end, const StateReader& in) const {
   for (const Step& step : steps_) {
     in.Check(step.slot, 0, end, "a step of a filter at an unknown location");
     for (const Belief* belief : {&step.posterior, &step.likelihood}) {
-      if (!good(belief->new_place) || belief->places.size() > static_cast<std::size_t>(end) ||
+      if (!good(belief->new_place) || belief->places.size() > internal::Index(end) ||
           !std::all_of(belief->places.begin(), belief->places.end(), good)) {
         in.Damaged("a step of a filter that is no belief");
       }

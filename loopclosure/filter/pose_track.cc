@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/index.h"
 #include "core/state_archive.h"
 
 namespace tutti {
@@ -20,7 +21,7 @@ void PoseTrack::Add(int slot, const std::optional<PosePrior>& prior) {
     if (last_ && last_->frame == prior->frame) way_m_ += (prior->position_m - last_->position_m).norm();
     last_ = prior;
   }
-  stations_.resize(static_cast<std::size_t>(slot));
+  stations_.resize(internal::Index(slot));
   stations_.push_back({prior, way_m_});
 }
 
@@ -36,7 +37,7 @@ std::vector<double> PoseTrack::Gains(const std::vector<int>& working_memory) con
   std::vector<std::size_t> known;
   double sum = 0;
   for (const int slot : working_memory) {
-    const auto i = static_cast<std::size_t>(slot);
+    const auto i = internal::Index(slot);
     const std::optional<PosePrior>& there = stations_[i].prior;
     if (!there || there->frame != here.prior->frame) continue;
     const double sigma = here.prior->sigma_m + here.prior->drift * (here.way_m - stations_[i].way_m);
@@ -71,7 +72,7 @@ void ApplyGains(const std::vector<double>& gains, const std::vector<int>& workin
                 Belief& likelihood) {
   if (gains.empty()) return;
   for (const int slot : working_memory) {
-    const auto i = static_cast<std::size_t>(slot);
+    const auto i = internal::Index(slot);
     if (i >= likelihood.places.size()) continue;
     double& value = likelihood.places[i];
     value = gains[i] <= 1 ? gains[i] * value : value + (gains[i] - 1) * std::max(0.0, value - 1);

@@ -28,7 +28,7 @@ struct EpipolarResult {
 EpipolarResult FitFundamental(const std::vector<cv::Point2f>& first, const std::vector<cv::Point2f>& second,
                               const EpipolarSettings& settings);
 
-/// The same with calibration (the cameras may differ, and may distort); points behind a camera are no
+/// Fits with calibration (the cameras may differ, and may distort); points behind a camera are no
 /// inliers.
 EpipolarResult FitEssential(const std::vector<cv::Point2f>& first, const PinholeCamera& first_camera,
                             const std::vector<cv::Point2f>& second, const PinholeCamera& second_camera,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/dense_solvers.h"
+#include "core/index.h"
 
 namespace tutti::internal {
 namespace {
@@ -61,7 +62,7 @@ int GridCell(const cv::Point2f& pixel, const cv::Size& image) {
 int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image) {
   if (image.empty()) return 0;
   std::array<bool, kGridColumns * kGridRows> occupied{};
-  for (const cv::Point2f& p : pixels) occupied[static_cast<std::size_t>(GridCell(p, image))] = true;
+  for (const cv::Point2f& p : pixels) occupied[Index(GridCell(p, image))] = true;
   return static_cast<int>(std::count(occupied.begin(), occupied.end(), true));
 }
 
@@ -107,7 +108,7 @@ using Cells = std::array<int, kGridColumns * kGridRows>;
 Cells CountFeatures(const View& view) {
   Cells cells{};
   const auto count = [&](const View::Set& set) {
-    for (const cv::Point2f& p : set.pixels) ++cells[static_cast<std::size_t>(GridCell(p, view.size))];
+    for (const cv::Point2f& p : set.pixels) ++cells[Index(GridCell(p, view.size))];
   };
   for (const View::Set& set : view.members) count(set);
   count(view.caller);
@@ -130,7 +131,7 @@ double ShareApart(const std::vector<VerifiedMatch>& matches, const View& query, 
     for (int r = std::max(0, row - 1); r <= std::min(kGridRows - 1, row + 1); ++r) {
       for (int c = std::max(0, column - 1); c <= std::min(kGridColumns - 1, column + 1); ++c) {
         const int at = r * kGridColumns + c;
-        near[static_cast<std::size_t>(at)] = true;
+        near[Index(at)] = true;
       }
     }
   }

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "core/index.h"
 #include "core/least_squares.h"
 #include "core/reprojection.h"
 #include "core/umeyama.h"
@@ -97,8 +98,8 @@ std::vector<Pose> FitP3p(const PnpProblem& problem, const std::vector<int>& samp
   std::vector<cv::Point3d> object;
   std::vector<cv::Point2d> image;
   for (const int i : sample) {
-    const Eigen::Vector3d& p = problem.points[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d& u = problem.pixels[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d& p = problem.points[internal::Index(i)];
+    const Eigen::Vector2d& u = problem.pixels[internal::Index(i)];
     object.emplace_back(p.x(), p.y(), p.z());
     image.emplace_back((u.x() - problem.camera.cx) / problem.camera.fx,
                        (u.y() - problem.camera.cy) / problem.camera.fy);
@@ -136,7 +137,7 @@ bool RefinePnp(const PnpProblem& problem, const std::vector<int>& inliers, doubl
     for (const int i : inliers) {
       Eigen::Vector2d r;
       Reprojection::PoseJacobian j;
-      if (!PnpTerms(problem, T_camera_points, static_cast<std::size_t>(i), r, j)) continue;
+      if (!PnpTerms(problem, T_camera_points, internal::Index(i), r, j)) continue;
       equations.Add(j, r, internal::HuberWeight(r.squaredNorm(), huber_px * huber_px));
     }
   };
@@ -161,7 +162,7 @@ std::vector<int> PnpInliers(const PnpProblem& problem, const Pose& T_camera_poin
 void FinishPnp(const PnpProblem& problem, const RelativePoseOptions& options, PnpResult& result) {
   double squares = 0.0;
   for (const int i : result.inliers) {
-    const std::size_t k = static_cast<std::size_t>(i);
+    const std::size_t k = internal::Index(i);
     Eigen::Vector2d r;
     Reprojection::PoseJacobian j;
     if (!PnpTerms(problem, result.T_camera_points, k, r, j)) continue;
@@ -202,8 +203,8 @@ std::vector<ScoredSimilarity> FitSimilarity(const SimilarityProblem& problem,
   std::vector<Eigen::Vector3d> a;
   std::vector<Eigen::Vector3d> b;
   for (const int i : sample) {
-    a.push_back(problem.points_a[static_cast<std::size_t>(i)]);
-    b.push_back(problem.points_b[static_cast<std::size_t>(i)]);
+    a.push_back(problem.points_a[internal::Index(i)]);
+    b.push_back(problem.points_b[internal::Index(i)]);
   }
   const std::optional<Similarity> S = internal::Umeyama(a, b, true);
   if (!S || !(S->scale > 0.0)) return {};
@@ -240,7 +241,7 @@ bool RefineSimilarity(const SimilarityProblem& problem, const std::vector<int>& 
     for (const int i : inliers) {
       Eigen::Vector2d r[2];
       Jacobian2x7 j[2];
-      if (!SimilarityTerms(problem, S_a_b, S_b_a, static_cast<std::size_t>(i), r, j)) continue;
+      if (!SimilarityTerms(problem, S_a_b, S_b_a, internal::Index(i), r, j)) continue;
       for (int side = 0; side < 2; ++side) {
         equations.Add(j[side], r[side], internal::HuberWeight(r[side].squaredNorm(), huber_px * huber_px));
       }
@@ -273,7 +274,7 @@ void FinishSimilarity(const SimilarityProblem& problem, const RelativePoseOption
   for (const int i : result.inliers) {
     Eigen::Vector2d r[2];
     Jacobian2x7 j[2];
-    if (!SimilarityTerms(problem, result.S_a_b, S_b_a, static_cast<std::size_t>(i), r, j)) continue;
+    if (!SimilarityTerms(problem, result.S_a_b, S_b_a, internal::Index(i), r, j)) continue;
     for (int side = 0; side < 2; ++side) {
       squares += 0.5 * r[side].squaredNorm();
       result.information += j[side].transpose() * j[side] / variance;
@@ -332,7 +333,7 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
       static_cast<int>(points.size()), settings,
       [&](const std::vector<int>& sample) { return FitP3p(problem, sample); },
       [&](const Pose& pose, int i) {
-        const std::size_t k = static_cast<std::size_t>(i);
+        const std::size_t k = internal::Index(i);
         return SquaredError(camera, pose * problem.points[k], problem.pixels[k]) / squared;
       },
       result.T_camera_points);
@@ -378,7 +379,7 @@ SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
       static_cast<int>(n), settings,
       [&](const std::vector<int>& sample) { return FitSimilarity(problem, sample); },
       [&](const ScoredSimilarity& model, int i) {
-        return SimilarityError(problem, model.S_a_b, model.S_b_a, static_cast<std::size_t>(i)) / squared;
+        return SimilarityError(problem, model.S_a_b, model.S_b_a, internal::Index(i)) / squared;
       },
       best);
   result.S_a_b = best.S_a_b;

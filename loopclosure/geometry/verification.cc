@@ -6,6 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "core/index.h"
 #include "loopclosure/geometry/evidence.h"
 #include "loopclosure/geometry/matching.h"
 #include "loopclosure/geometry/motion.h"
@@ -69,7 +70,7 @@ void Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers
   std::vector<cv::Point2f> in_query;
   std::vector<cv::Point2f> in_candidate;
   for (const int i : inliers) {
-    const PooledMatch& m = pool[static_cast<std::size_t>(i)];
+    const PooledMatch& m = pool[internal::Index(i)];
     result.inlier_matches.push_back({m.query, m.candidate, m.query_feature, m.candidate_feature});
     in_query.push_back(m.query);
     in_candidate.push_back(m.candidate);
@@ -126,7 +127,7 @@ bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const 
   if (static_cast<int>(points.size()) < options.min_inliers) return false;
   const PnpResult pnp = SolvePnp(points, pixels, *query.camera, PoseOptions(options, seed));
   std::vector<int> inliers;
-  for (const int i : pnp.inliers) inliers.push_back(index[static_cast<std::size_t>(i)]);
+  for (const int i : pnp.inliers) inliers.push_back(index[internal::Index(i)]);
   result.type = ConstraintType::kRigid;
   const int considered = static_cast<int>(points.size());
   const internal::ChanceFit chance =
@@ -148,7 +149,7 @@ void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>&
   std::vector<Eigen::Vector3d> points_c, points_q;
   std::vector<Eigen::Vector2d> pixels_c, pixels_q;
   for (const int i : inliers) {
-    const PooledMatch& m = pool[static_cast<std::size_t>(i)];
+    const PooledMatch& m = pool[internal::Index(i)];
     if (!m.candidate_point.allFinite() || !m.query_point.allFinite()) continue;
     points_c.push_back(m.candidate_point.cast<double>());
     points_q.push_back(m.query_point.cast<double>());

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/index.h"
 #include "core/state_archive.h"
 #include "loopclosure/geometry/verification.h"
 
@@ -79,7 +80,7 @@ void DropMasked(const cv::Mat& mask, View::Set& set) {
   set = std::move(kept);
 }
 
-// Of the image; without one (the caller extracts all features) of the camera, or what the features reach
+// Size of the image; without one (the caller extracts all features) of the camera, or what the features reach
 // over.
 cv::Size SizeOf(const LoopQuery& query, const std::vector<Features>& members) {
   if (!query.image.empty()) return query.image.size();
@@ -198,8 +199,7 @@ void View::Set::State(Archive& archive) {
       archive.Damaged("a feature at an impossible pixel");
     }
     for (std::size_t i = 0; i < x.size(); ++i) pixels.emplace_back(x[i], y[i]);
-    if (static_cast<std::size_t>(descriptors.rows()) != pixels.size())
-      archive.Damaged("features without descriptors");
+    if (internal::Index(descriptors.rows()) != pixels.size()) archive.Damaged("features without descriptors");
   }
   StateOfPoints(archive, pixels.size(), points);
 }

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/index.h"
+
 namespace tutti {
 
 /// Over the virtual place (S = -1, "new place") and all slots; slots that are not in working memory hold 0.
@@ -17,7 +19,7 @@ struct Belief {
   int Best() const {
     int best = -1;
     for (std::size_t i = 0; i < places.size(); ++i) {
-      if (places[i] > 0.0 && (best < 0 || places[i] >= places[static_cast<std::size_t>(best)]))
+      if (places[i] > 0.0 && (best < 0 || places[i] >= places[internal::Index(best)]))
         best = static_cast<int>(i);
     }
     return best;

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/index.h"
+
 namespace tutti {
 
 /// Empty if a dense member may have this descriptor of an image (or none), else what is wrong. `width`: of
@@ -51,9 +53,9 @@ class DenseModel {
   void FinishLoading();
 
   /// Descriptor of a slot; empty if it has none, or is not in memory.
-  const cv::Mat& descriptor(int slot) const { return descriptors_[static_cast<std::size_t>(slot)]; }
+  const cv::Mat& descriptor(int slot) const { return descriptors_[internal::Index(slot)]; }
   /// True if a slot is in memory, be it without a descriptor.
-  bool Has(int slot) const { return presence_[static_cast<std::size_t>(slot)] == Presence::kPresent; }
+  bool Has(int slot) const { return presence_[internal::Index(slot)] == Presence::kPresent; }
   /// Slots ever added.
   int size() const { return static_cast<int>(descriptors_.size()); }
   /// Empty if a descriptor may be added, else what is wrong.
@@ -64,7 +66,7 @@ class DenseModel {
   ///   z_i = max(0, (s_i - m) / (1.4826 MAD) - 2),   c_i = 20 z_i / (z_i + 4).
   /// 0 with fewer than 12 places, where nothing can stand out.
   std::vector<double> Counts(const std::vector<int>& places) const;
-  /// The same for an image that is no location, by its descriptor alone: s_i = d . d_i.
+  /// Counts for an image that is no location, by its descriptor alone: s_i = d . d_i.
   std::vector<double> CountsOf(const cv::Mat& descriptor, const std::vector<int>& places) const;
   /// For standardised evidence: means of the cosines, 0 where below 0, of every slot for the present image;
   std::vector<double> Scores() const;

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/index.h"
 #include "core/state_archive.h"
 #include "loopclosure/memory/dense_model.h"
 
@@ -17,7 +18,7 @@ void LikelihoodModel::Add(const Signature& signature) {
 }
 
 void LikelihoodModel::Restore(int slot, const Signature& signature) {
-  const std::size_t index = static_cast<std::size_t>(slot);
+  const std::size_t index = internal::Index(slot);
   if (present_[index]) return;
   present_[index] = true;
   ++locations_;
@@ -35,7 +36,7 @@ void LikelihoodModel::Insert(int slot) {
 }
 
 void LikelihoodModel::Remove(int slot) {
-  const std::size_t index = static_cast<std::size_t>(slot);
+  const std::size_t index = internal::Index(slot);
   if (!present_[index]) return;
   present_[index] = false;
   --locations_;
@@ -56,14 +57,14 @@ std::vector<double> LikelihoodModel::Scores(const Signature& query) const {
     const std::vector<Posting>& list = *found;
     if (kind_ == LikelihoodKind::kSimilarity) {
       for (const Posting& posting : list) {
-        scores[static_cast<std::size_t>(posting.slot)] += std::min(posting.count, entry.count);
+        scores[internal::Index(posting.slot)] += std::min(posting.count, entry.count);
       }
       continue;
     }
     const double inverse_frequency =
         std::log10(static_cast<double>(locations_) / static_cast<double>(list.size()));
     for (const Posting& posting : list) {
-      const std::size_t slot = static_cast<std::size_t>(posting.slot);
+      const std::size_t slot = internal::Index(posting.slot);
       scores[slot] += static_cast<double>(posting.count) / signatures_[slot].size() * inverse_frequency;
     }
   }
@@ -146,7 +147,7 @@ std::vector<double> LikelihoodModel::Counts(const SeenWords& query, const Sight&
                            (all * static_cast<double>(same.second - same.first));
       if (value > 0.0) {
         sight.ForEachReturn(*list, size() - 1, [&](const Posting& posting) {
-          in_cell.Add(static_cast<std::size_t>(posting.slot), posting.count * value);
+          in_cell.Add(internal::Index(posting.slot), posting.count * value);
         });
       }
     }
@@ -189,7 +190,7 @@ Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int
   double sum = 0.0;
   int count = 0;
   for (const int slot : working_memory) {
-    const double score = scores[static_cast<std::size_t>(slot)];
+    const double score = scores[internal::Index(slot)];
     if (score > 0.0) {
       sum += score;
       ++count;
@@ -198,14 +199,14 @@ Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int
   const double mean = count > 0 ? sum / count : 0.0;
   double squares = 0.0;
   for (const int slot : working_memory) {
-    const double score = scores[static_cast<std::size_t>(slot)];
+    const double score = scores[internal::Index(slot)];
     if (score > 0.0) squares += (score - mean) * (score - mean);
   }
   const double sigma = count > 1 ? std::sqrt(squares / (count - 1)) : 0.0;
 
   bool stands_out = false;
   for (const int slot : working_memory) {
-    const std::size_t i = static_cast<std::size_t>(slot);
+    const std::size_t i = internal::Index(slot);
     likelihood.places[i] = 1.0;
     if (scores[i] > 0.0 && scores[i] > mean + sigma) {
       likelihood.places[i] = (scores[i] - (sigma - 1e-4)) / mean;

@@ -78,7 +78,7 @@ class LocationMemory {
   bool RemoveLoop(int a, int b);
   /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
   std::vector<int> Settle() { return Settle(stm_size_); }
-  /// The same while |STM| > `most`; 0: another recording begins, and nothing is too recent for it.
+  /// Does so while |STM| > `most`; 0: another recording begins, and nothing is too recent for it.
   std::vector<int> Settle(int most);
   /// Rehearsal (section 6): the newest location is merged into the one before it, weight_old += 1 +
   /// weight_new, and dropped; its id names the older one from now on. Returns the older slot, -1 if STM holds

@@ -21,7 +21,6 @@ class Member {
   /// another name, and for a network of the member dnn that can't be used (whole_image.h).
   Member(const std::string& name, const LoopDetectorOptions& options, std::uint64_t seed);
 
-  /// As given.
   const std::string& name() const { return name_; }
 
   /// Step 1: features of an image: `grey` is what ToGrey8 makes of it. Where `mask` (CV_8UC1, or empty) is 0
@@ -43,7 +42,7 @@ class Member {
   /// bad_signature_ratio x their running mean, or fewer than two), which gets no words: the member sits this
   /// image out. Once per image: keeps the mean.
   bool Judge(const Features& features);
-  /// Of its vocabulary; 0 for a dense member.
+  /// Words of its vocabulary; 0 for a dense member.
   int num_words() const { return vocabulary_.size(); }
   /// Its vocabulary, for the memory: words leave and return with locations.
   Vocabulary& vocabulary() { return vocabulary_; }

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "core/byte_stream.h"
+#include "core/index.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
@@ -35,7 +36,7 @@ class Use {
     const void* data = sqlite3_column_blob(statement_, column);
     const int size = sqlite3_column_bytes(statement_, column);
     return data == nullptr ? std::string_view()
-                           : std::string_view(static_cast<const char*>(data), static_cast<std::size_t>(size));
+                           : std::string_view(static_cast<const char*>(data), Index(size));
   }
 
  private:

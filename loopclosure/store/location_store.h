@@ -51,7 +51,7 @@ class LocationStore {
   std::optional<std::string> Get(Kind kind, std::int64_t a, std::int64_t b);
   /// Calls for every record of a kind, ascending (a, b).
   void ForEach(Kind kind, const std::function<void(std::int64_t, std::int64_t, std::string_view)>& call);
-  /// As if the disk were full at this many pages (of 4 KiB, as a rule).
+  /// Makes the store behave as if the disk were full at this many pages (of 4 KiB, as a rule).
   void LimitPages(int pages);
   /// Removes all records.
   void Clear();

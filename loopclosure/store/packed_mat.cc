@@ -6,6 +6,7 @@
 #include <cstring>
 #include <vector>
 
+#include "core/index.h"
 #include "core/state_archive.h"
 
 namespace tutti::internal {
@@ -29,7 +30,7 @@ struct PackedMat::Code {
   int (*byte_of)(float);  // of a float that is one of them; of others any
   std::array<float, 256> values;
 
-  // Of a row; false if a value is none of them.
+  // Packs a row; false if a value is none of them.
   bool Pack(const float* from, int count, std::uint8_t* to) const {
     bool all = true;
     for (int i = 0; i < count; ++i) {
@@ -57,8 +58,8 @@ const std::array<PackedMat::Code, 2>& PackedMat::Codes() {
   static const std::array<Code, 2> codes = [&] {
     std::array<Code, 2> made = {Code{Kind::kWholeAsBytes, whole, {}}, Code{Kind::kSquaresAsBytes, root, {}}};
     for (int i = 0; i < 256; ++i) {
-      made[0].values[static_cast<std::size_t>(i)] = static_cast<float>(i);
-      made[1].values[static_cast<std::size_t>(i)] = SignedSquare(i < 128 ? i : i - 256);
+      made[0].values[Index(i)] = static_cast<float>(i);
+      made[1].values[Index(i)] = SignedSquare(i < 128 ? i : i - 256);
     }
     return made;
   }();
@@ -88,7 +89,7 @@ cv::Mat PackedMat::Unpacked() const {
 
 void PackedMat::CopyRow(int row, std::uint8_t* to) const {
   if (code_ == nullptr) {
-    std::copy_n(values_.ptr(row), static_cast<std::size_t>(values_.cols) * values_.elemSize(), to);
+    std::copy_n(values_.ptr(row), Index(values_.cols) * values_.elemSize(), to);
   } else {
     code_->Unpack(values_.ptr(row), values_.cols, reinterpret_cast<float*>(to));
   }
@@ -111,7 +112,7 @@ void PackedMat::State(Archive& archive) {
     values_.create(rows, columns, kind == Kind::kFloatPlanes ? CV_32F : CV_8U);
     for (const Code& code : Codes()) code_ = code.kind == kind ? &code : code_;
   }
-  const auto height = static_cast<std::size_t>(rows), width = static_cast<std::size_t>(columns);
+  const auto height = Index(rows), width = Index(columns);
   if (kind == Kind::kFloatPlanes) {
     std::vector<float> values(Archive::kReading ? 0 : height * width);
     auto element = values.begin();

@@ -56,7 +56,7 @@ class DescriptorIndex {
 /// for the others.
 std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed);
 
-/// The same forest of FLANN's own KDTreeIndex: for comparison (docs/loop-closure.md, section 3). FLANN keeps
+/// Such a forest of FLANN's own KDTreeIndex: for comparison (docs/loop-closure.md, section 3). FLANN keeps
 /// every branch that a search passes, clears a bitset and reserves a heap of the size of the index for each
 /// tree and query, and can't let go of a removed word, so that all trees are grown anew once most of their
 /// words are gone.

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "core/clones.h"
+#include "core/index.h"
 #include "core/state_archive.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/bit_trie.h"
@@ -16,17 +17,15 @@ constexpr int kExactUpTo = 1000;  // below this an exact scan is as fast as the 
 
 class HammingIndex : public DescriptorIndex {
  public:
-  HammingIndex(int bytes, int tables, std::uint64_t seed)
-      : bytes_(bytes), storage_(static_cast<std::size_t>(bytes)) {
+  HammingIndex(int bytes, int tables, std::uint64_t seed) : bytes_(bytes), storage_(internal::Index(bytes)) {
     std::mt19937_64 generator(seed);
     for (int t = 0; t < tables; ++t) tries_.emplace_back(bytes, generator);
   }
 
   void Add(const std::vector<int>& words, const cv::Mat& rows) override {
-    CV_Assert(rows.type() == CV_8U && rows.cols == bytes_ &&
-              static_cast<std::size_t>(rows.rows) == words.size());
+    CV_Assert(rows.type() == CV_8U && rows.cols == bytes_ && internal::Index(rows.rows) == words.size());
     for (int i = 0; i < rows.rows; ++i) {
-      const int word = words[static_cast<std::size_t>(i)];
+      const int word = words[internal::Index(i)];
       if (storage_.RowOf(word) >= 0) continue;
       const int row = storage_.Add(word, rows.ptr(i));
       for (internal::BitTrie& trie : tries_) trie.Insert(row, storage_);
@@ -42,7 +41,7 @@ class HammingIndex : public DescriptorIndex {
 
   std::vector<TwoNearest> Search(const cv::Mat& descriptors) const override {
     std::vector<TwoNearest> found;
-    found.reserve(static_cast<std::size_t>(descriptors.rows));
+    found.reserve(internal::Index(descriptors.rows));
     std::vector<internal::BitTrie::Walk> walks;
     std::vector<int> rows;
     for (int i = 0; i < descriptors.rows; ++i) {
@@ -72,7 +71,7 @@ class HammingIndex : public DescriptorIndex {
   void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
     storage_.State(archive, CV_8U, known);
     if constexpr (Archive::kReading) {
-      std::vector<int> rows(static_cast<std::size_t>(storage_.end()));
+      std::vector<int> rows(internal::Index(storage_.end()));
       std::iota(rows.begin(), rows.end(), 0);
       for (internal::BitTrie& trie : tries_) trie.InsertAll(rows, storage_);
     }
@@ -117,11 +116,11 @@ TUTTI_CLONES("popcnt")
 void HammingIndex::Scan(const std::vector<int>& rows, const std::uint8_t* descriptor,
                         TwoNearest& nearest) const {
   constexpr std::size_t kAhead = 8;  // words lie anywhere in memory: ask for them before they are needed
-  internal::CheckReadable(descriptor, static_cast<std::size_t>(bytes_));
+  internal::CheckReadable(descriptor, internal::Index(bytes_));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + kAhead < rows.size()) __builtin_prefetch(storage_.At(rows[i + kAhead]));
     const std::uint8_t* const word = storage_.At(rows[i]);
-    internal::CheckReadable(word, static_cast<std::size_t>(bytes_));
+    internal::CheckReadable(word, internal::Index(bytes_));
     const float distance = static_cast<float>(internal::HammingDistance(descriptor, word, bytes_));
     if (distance <= nearest.second_distance) nearest.Offer(storage_.WordOf(rows[i]), distance);
   }

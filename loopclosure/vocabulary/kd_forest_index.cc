@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/index.h"
 #include "core/shuffle.h"
 #include "core/state_archive.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
@@ -31,7 +32,7 @@ class KdForestIndex : public DescriptorIndex {
   KdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed)
       : dimensions_(dimensions),
         checks_per_tree_(std::max(1, checks / trees)),
-        storage_(static_cast<std::size_t>(dimensions) * sizeof(float)) {
+        storage_(internal::Index(dimensions) * sizeof(float)) {
     for (int t = 0; t < trees; ++t) {
       trees_.push_back({internal::KdTree(dimensions), internal::Shuffler(seed, t)});
     }
@@ -39,7 +40,7 @@ class KdForestIndex : public DescriptorIndex {
 
   void Add(const std::vector<int>& words, const cv::Mat& rows) override {
     CV_Assert(rows.type() == CV_32F && rows.cols == dimensions_ &&
-              static_cast<std::size_t>(rows.rows) == words.size());
+              internal::Index(rows.rows) == words.size());
     std::vector<int> added;
     for (std::size_t i = 0; i < words.size(); ++i) {
       if (storage_.RowOf(words[i]) >= 0) continue;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/index.h"
 #include "core/state_archive.h"
 
 namespace tutti {
@@ -41,9 +42,9 @@ double Signature::Similarity(const Signature& a, const Signature& b) {
 }
 
 std::vector<Signature> Signature::Split(int parts) const {
-  std::vector<Signature> split(static_cast<std::size_t>(parts));
+  std::vector<Signature> split(internal::Index(parts));
   for (const Entry& entry : entries_) {
-    Signature& part = split[static_cast<std::size_t>(entry.word % parts)];
+    Signature& part = split[internal::Index(entry.word % parts)];
     part.entries_.push_back({entry.word / parts, entry.count});
     part.size_ += entry.count;
   }

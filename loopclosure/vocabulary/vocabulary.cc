@@ -3,64 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
+#include "core/index.h"
 #include "core/parallel.h"
 #include "core/state_archive.h"
-#include "loopclosure/features/distances.h"
 #include "loopclosure/features/whole_rows.h"
 #include "loopclosure/vocabulary/word_storage.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
-
-// True distances of an image's descriptors to those of them that became words, exactly.
-class AmongThemselves {
- public:
-  explicit AmongThemselves(const cv::Mat& descriptors) : descriptors_(descriptors) {
-    for (std::vector<float>& distances : block_) distances.resize(static_cast<std::size_t>(descriptors.rows));
-    if (descriptors.type() != CV_32F) return;
-    for (const float scale : {1.0f, internal::WholeRows::kSignedSquares}) {
-      scale_ = scale;
-      whole_ = internal::WholeRows::Of(descriptors, scale);
-      if (!whole_) continue;
-      columns_.emplace(*whole_);
-      return;
-    }
-  }
-
-  // Of row i to the rows `to`, all of them before it; for i = 0, 1, 2, ... in this order.
-  const std::vector<float>& Of(int i, const std::vector<int>& to) {
-    distances_.resize(to.size());
-    if (columns_) {
-      if (i % internal::WholeRows::kTogether == 0) whole_->Distances(i, *columns_, block_);
-      const std::vector<float>& all = block_.at(static_cast<std::size_t>(i % internal::WholeRows::kTogether));
-      for (std::size_t k = 0; k < to.size(); ++k)
-        distances_[k] = std::sqrt(all[static_cast<std::size_t>(to[k])]) / scale_;
-      return distances_;
-    }
-    for (std::size_t k = 0; k < to.size(); ++k) {
-      if (descriptors_.type() == CV_8U) {
-        internal::HammingDistances(descriptors_.ptr(i), descriptors_.ptr(to[k]), 1, descriptors_.cols, 0,
-                                   &distances_[k]);
-      } else {
-        internal::SquaredDistances(descriptors_.ptr<float>(i), descriptors_.ptr<float>(to[k]), 1,
-                                   descriptors_.cols, 0, &distances_[k]);
-        distances_[k] = std::sqrt(distances_[k]);
-      }
-    }
-    return distances_;
-  }
-
- private:
-  const cv::Mat& descriptors_;
-  float scale_ = 1.0f;
-  std::optional<internal::WholeRows> whole_;
-  std::optional<internal::WholeRows::Columns> columns_;
-  internal::WholeRows::Block block_;
-  std::vector<float> distances_;
-};
 
 std::string TypeName(int type, int width) {
   return (type == CV_32F  ? "CV_32F x "
@@ -105,7 +57,7 @@ void Vocabulary::MakeIndex() {
 
 std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
   if (descriptors.rows == 0) return {};
-  std::vector<TwoNearest> nearest(static_cast<std::size_t>(descriptors.rows));
+  std::vector<TwoNearest> nearest(internal::Index(descriptors.rows));
   constexpr int kBlock = 50;
   RunParallel((descriptors.rows + kBlock - 1) / kBlock, threads, [&](int block) {
     Search(descriptors, block * kBlock, std::min(descriptors.rows, (block + 1) * kBlock), nearest);
@@ -133,13 +85,14 @@ std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vecto
   CheckType(descriptors);
   const int old_words = created_;
   std::vector<int> created;  // rows that became words
-  AmongThemselves among(descriptors);
+  internal::RowDistances among_themselves(descriptors, descriptors);
   words.reserve(nearest.size());
   for (int i = 0; i < descriptors.rows; ++i) {
-    TwoNearest best = nearest[static_cast<std::size_t>(i)];
-    const std::vector<float>& distances = among.Of(i, created);
-    for (std::size_t k = 0; k < distances.size(); ++k) {
-      if (distances[k] < best.second_distance) best.Offer(old_words + static_cast<int>(k), distances[k]);
+    TwoNearest best = nearest[internal::Index(i)];
+    const std::vector<float>& squares = among_themselves.To(i, i);
+    for (std::size_t k = 0; k < created.size(); ++k) {
+      const float distance = std::sqrt(squares[internal::Index(created[k])]) / among_themselves.scale();
+      if (distance < best.second_distance) best.Offer(old_words + static_cast<int>(k), distance);
     }
     if (IsNew(best)) {
       words.push_back(old_words + static_cast<int>(created.size()));

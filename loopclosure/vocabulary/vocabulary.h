@@ -45,7 +45,7 @@ class Vocabulary {
   void Search(const cv::Mat& descriptors, int begin, int end, std::vector<TwoNearest>& nearest) const;
   /// The second step: a word for each of N descriptors, of which `nearest` (size N) holds what Search found.
   std::vector<int> Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest);
-  /// Of what Search found, the words that Assign would not make new, -1 for the others: nothing is added.
+  /// The words of what Search found that Assign would not make new, -1 for the others: nothing is added.
   std::vector<int> Recognise(const std::vector<TwoNearest>& nearest) const;
 
   /// One more location that has these words.

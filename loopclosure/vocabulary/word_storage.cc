@@ -73,7 +73,7 @@ std::vector<int> WordStorage::Ranks() const {
 
 template <class Archive>
 void WordStorage::State(Archive& archive, int type, const std::vector<PackedMat>& known) {
-  const int width = static_cast<int>(row_bytes_ / static_cast<std::size_t>(CV_ELEM_SIZE(type)));
+  const int width = static_cast<int>(row_bytes_ / Index(CV_ELEM_SIZE(type)));
   const KnownRows rows(known, type, width);
   std::vector<int> words;
   std::vector<int>

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/index.h"
 #include "loopclosure/store/packed_mat.h"
 #include "loopclosure/vocabulary/word_map.h"
 
@@ -52,7 +53,7 @@ class WordStorage {
         blocks_.push_back(std::make_unique<std::uint8_t[]>(kRowsPerBlock * row_bytes_));
       }
     }
-    words_[static_cast<std::size_t>(row)] = word;
+    words_[Index(row)] = word;
     std::memcpy(At(row), descriptor, row_bytes_);
     row_of_word_[word] = row;
     return row;
@@ -60,7 +61,7 @@ class WordStorage {
 
   void Free(int row) {
     row_of_word_.Erase(WordOf(row));
-    words_[static_cast<std::size_t>(row)] = -1;
+    words_[Index(row)] = -1;
     free_.push_back(row);
   }
 
@@ -70,9 +71,9 @@ class WordStorage {
     return row == nullptr ? -1 : *row;
   }
   /// Word of a row number, -1 if the row is free.
-  int WordOf(int row) const { return words_[static_cast<std::size_t>(row)]; }
+  int WordOf(int row) const { return words_[Index(row)]; }
   std::uint8_t* At(int row) const {
-    const std::size_t index = static_cast<std::size_t>(row);
+    const std::size_t index = Index(row);
     return blocks_[index / kRowsPerBlock].get() + index % kRowsPerBlock * row_bytes_;
   }
   /// Calls call(word, row) for every word, ascending.

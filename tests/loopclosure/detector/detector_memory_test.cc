@@ -98,15 +98,6 @@ TEST(LoopDetectorMemory, ATimeBudgetThatIsExceededShrinksWorkingMemory) {
   EXPECT_LE(detector.NumLocations(), 3u + 1u + 5u + 2u);
 }
 
-TEST(LoopDetectorMemory, TheSameImageAgainAndAgainIsOneLocationUnderRehearsal) {
-  LoopDetectorOptions options = SmallOptions();
-  options.rehearsal = true;
-  LoopDetector detector(options);
-  const cv::Mat image = testing::TexturedImage(1, 240, 180);
-  for (int i = 0; i < 12; ++i) detector.Detect(image, i);
-  EXPECT_EQ(detector.NumLocations(), 1u);
-}
-
 TEST(LoopDetectorMemory, ImagesWithoutFeaturesAreNoLocationsIfToldSo) {
   LoopDetectorOptions options = SmallOptions();
   LoopDetector keeps(options);

@@ -89,17 +89,6 @@ TEST(PosePrior, PositionsOfAnotherWorldSayNothing) {
   EXPECT_EQ(with.posterior_by_location, without.posterior_by_location);
 }
 
-TEST(PosePrior, OfNumbersThatAreNoneIsRefused) {
-  LoopDetector detector(testing::SmallOptions());
-  LoopQuery query;
-  query.image = testing::TexturedImage(1, 240, 180);
-  for (const PosePrior& prior : {PriorAt(std::nan("")), PriorAt(0, 0), PriorAt(0, 1, -1),
-                                 PriorAt(0, std::numeric_limits<double>::infinity())}) {
-    query.pose_prior = prior;
-    EXPECT_THROW(detector.Detect(query), InputError);
-  }
-}
-
 TEST(PoseTrack, GainsAreOneInTheMeanAndBounded) {
   PoseTrack track;
   std::vector<int> places;

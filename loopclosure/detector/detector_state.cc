@@ -52,9 +52,7 @@ void DetectorState::StoreView(int slot, LocationStore& store) const {
 View DetectorState::StoredView(int slot, LocationStore& store) const {
   const auto record = store.Get(Kind::kView, 0, slot);
   if (!record) {
-    throw InputError(store.name() + ": is damaged (the features of location " +
-                     std::to_string(memory().id(slot)) +
-                     " are missing); give another file, or an older copy");
+    store.Damaged("the features of location " + std::to_string(memory().id(slot)) + " are missing");
   }
   View view;
   ReadStateBytes(*record, store.name(), view);
@@ -77,9 +75,7 @@ void DetectorState::CheckMemories(const std::string& source) const {
     }
   }
   for (int slot = 0; slot < size; ++slot) {
-    const LocationState state = memory().state(slot);
-    if (reasoner_.InMemory(slot) !=
-        (state == LocationState::kShortTerm || state == LocationState::kWorking)) {
+    if (reasoner_.InMemory(slot) != memory().Holds(slot)) {
       in.Damaged("a location that is in no memory");
     }
   }

@@ -38,9 +38,8 @@ std::vector<int> HypothesisSearch::TopPlaces(const Belief& belief) const {
     if (places.size() == wanted) break;
     if (std::find(covered.begin(), covered.end(), slot) != covered.end()) continue;
     places.push_back(slot);
-    for (const auto& [near, level, loops] : memory_.Neighbours(slot, 1 + options_.verification.neighbours)) {
-      covered.push_back(near);
-    }
+    const std::vector<int> near = memory_.SlotsNear(slot, 1 + options_.verification.neighbours);
+    covered.insert(covered.end(), near.begin(), near.end());
   }
   return places;
 }

@@ -1,6 +1,5 @@
 #include "loopclosure/detector/journal.h"
 
-#include <functional>
 #include <string>
 #include <string_view>
 
@@ -16,17 +15,6 @@ namespace {
 // Meta records: what the file belongs to, and the detector's running figures.
 constexpr int kFingerprint = 0;
 constexpr int kStatistics = 1;
-
-void InOneStep(LocationStore& store, const std::function<void()>& puts) {
-  try {
-    store.Begin();
-    puts();
-    store.Commit();
-  } catch (const InputError&) {
-    store.Rollback();
-    throw;
-  }
-}
 
 }  // namespace
 
@@ -59,7 +47,7 @@ void Journal::Clear() {
 }
 
 void Journal::Write(LocationStore& store) {
-  InOneStep(store, [&] { PutNoted(store); });
+  store.InOneStep([&] { PutNoted(store); });
   Clear();
 }
 
@@ -94,7 +82,7 @@ void Journal::Rewrite(LocationStore& store, LocationStore* long_term) {
     for (int slot = 0; slot < memories[m]->size(); ++slot) nodes_[m].insert(slot);
   }
   stored_words_.assign(stored_words_.size(), 0);
-  InOneStep(store, [&] {
+  store.InOneStep([&] {
     store.Clear();
     store.Put(Kind::kMeta, kFingerprint, 0, state_.reasoner().Fingerprint());
     for (const Kind kind : {Kind::kSignature, Kind::kView, Kind::kWord}) {

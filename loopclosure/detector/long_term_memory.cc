@@ -73,12 +73,11 @@ bool LongTermMemory::Transfer(MemorySystem& system, int slot, LoopResult& result
     if (!journal_.Holds(slot)) return false;  // it could not be written: see Record
   } else {
     try {
-      store_->Begin();
-      system.Store(slot, *store_);
-      state_.StoreView(slot, *store_);
-      store_->Commit();
+      store_->InOneStep([&] {
+        system.Store(slot, *store_);
+        state_.StoreView(slot, *store_);
+      });
     } catch (const InputError& error) {
-      store_->Rollback();
       result.warning = error.what();
       return false;
     }

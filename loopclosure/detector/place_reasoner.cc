@@ -150,23 +150,15 @@ CandidateEvidence PlaceReasoner::EvidenceAt(int slot, const std::vector<double>&
 
 void PlaceReasoner::FillOpinion(std::size_t member, const CombinedBelief& combined,
                                 MemberOpinion& opinion) const {
-  const MemorySystem* system = nullptr;
-  std::size_t unit_number = 0;
-  for (const auto& candidate : systems_) {
-    for (std::size_t u = 0; u < candidate->units().size(); ++u) {
-      const std::vector<std::size_t>& of_unit = candidate->units()[u].members;
-      if (std::find(of_unit.begin(), of_unit.end(), member) == of_unit.end()) continue;
-      system = candidate.get();
-      unit_number = u;
-    }
-  }
-  if (system == nullptr) return;
-  const FilterUnit& unit = system->units()[unit_number];
+  const std::size_t number = options_.rule == CombinationRule::kNaive ? 0 : member;  // of UnitsOf
+  const MemorySystem& system = *systems_[Shared() ? 0 : number];
+  const std::size_t of_system = Shared() ? number : 0;
+  const FilterUnit& unit = system.units()[of_system];
   opinion.took_part = unit.took_part();
   if (!unit.took_part()) return;
   const Belief& posterior = unit.filter.posterior();
   opinion.hypothesis = posterior.Hypothesis();
-  opinion.weight = options_.rule == CombinationRule::kJoint ? system->WeightOf(unit_number) : 1.0;
+  opinion.weight = options_.rule == CombinationRule::kJoint ? system.WeightOf(of_system) : 1.0;
   const int best = posterior.Best();
   if (best >= 0) opinion.best = memory().id(best);
   if (combined.best >= 0) opinion.at_candidate = PosteriorAt(posterior, combined.best);
@@ -276,10 +268,8 @@ bool PlaceReasoner::Merge(int slot, std::int64_t into) {
 }
 
 bool PlaceReasoner::InMemory(int slot) const {
-  return std::any_of(systems_.begin(), systems_.end(), [slot](const auto& system) {
-    const LocationState state = system->memory().state(slot);
-    return state == LocationState::kShortTerm || state == LocationState::kWorking;
-  });
+  return std::any_of(systems_.begin(), systems_.end(),
+                     [slot](const auto& system) { return system->memory().Holds(slot); });
 }
 
 std::string PlaceReasoner::Fingerprint() const {

@@ -28,11 +28,7 @@ bool Contains(const std::vector<int>& slots, int slot) {
 
 // Where the loops of the images before and after may lead, if this one leads to `place`.
 std::vector<int> Around(std::int64_t place, const LocationMemory& memory) {
-  std::vector<int> around;
-  for (const auto& [slot, level, loops] :
-       memory.Neighbours(memory.Find(place), kAboutHere + Hindsight::kImages))
-    around.push_back(slot);
-  return around;
+  return memory.SlotsNear(memory.Find(place), kAboutHere + Hindsight::kImages);
 }
 
 // Two of the images before close loops there. One may be an alias, and would drag the next along.
@@ -76,8 +72,7 @@ std::optional<LateLoop> SecondWord::Say(const LoopDetectorOptions& options, cons
   if (slot < 0 || first_.empty() || first_.front().slot != slot) return std::nullopt;
   LoopResult word = std::move(first_.front().result);
   first_.pop_front();
-  if (memory.state(slot) != LocationState::kShortTerm && memory.state(slot) != LocationState::kWorking)
-    return std::nullopt;
+  if (!memory.Holds(slot)) return std::nullopt;
   const Belief belief = hindsight_.Smoothed(transition, memory.working_memory());
   const bool before = word.accepted;
   if (before) {

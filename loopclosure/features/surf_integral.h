@@ -13,8 +13,6 @@ namespace tutti::internal {
 /// ask whether it touches the border. The same sums, in a fraction of the time.
 class SurfIntegral {
  public:
-  using value_type = int;
-
   /// `grey`: an 8-bit image of at most 2^23 pixels, which takes the place of the one before.
   void Compute(const cv::Mat& grey) { cv::integral(grey, sums_, CV_32S); }
 
@@ -23,11 +21,6 @@ class SurfIntegral {
 
   /// Sums over all that lies above and left of the pixels of a row.
   const int* Row(long r) const { return sums_.ptr<int>(static_cast<int>(r)); }
-
-  /// Sum over a rectangle inside of the image, its last row and column included.
-  int get_sum_of_area(const dlib::rectangle& area) const {
-    return Sum(area.left(), area.top(), area.right() + 1, area.bottom() + 1);
-  }
 
   /// Haar wavelets of `width` pixels around a point, as dlib::haar_x and dlib::haar_y define them; both share
   /// their corners.
@@ -44,12 +37,6 @@ class SurfIntegral {
   }
 
  private:
-  int Sum(long left, long top, long right, long bottom) const {
-    const int* above = Row(top);
-    const int* below = Row(bottom);
-    return below[right] - below[left] - above[right] + above[left];
-  }
-
   cv::Mat sums_;
 };
 

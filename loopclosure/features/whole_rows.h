@@ -22,14 +22,10 @@ class WholeRows {
   /// fit 32 bits.
   static std::optional<WholeRows> Of(const cv::Mat& rows, float scale);
 
-  int rows() const { return static_cast<int>(squares_.size()); }
-  int cols() const { return 2 * pairs_; }
-
   /// Rows as the other side of Distances needs them.
   class Columns {
    public:
     explicit Columns(const WholeRows& rows);
-    int rows() const { return static_cast<int>(squares_.size()); }
 
    private:
     friend class WholeRows;

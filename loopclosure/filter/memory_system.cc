@@ -207,12 +207,8 @@ void MemorySystem::StepJoint() {
 }
 
 std::vector<int> MemorySystem::NearBest(const PlaceFilter& place_filter) const {
-  std::vector<int> near;
   const int best = place_filter.filter.posterior().Best();
-  if (best < 0) return near;
-  for (const auto& [slot, level, loops] : memory_.Neighbours(best, kNearLevels)) near.push_back(slot);
-  std::sort(near.begin(), near.end());
-  return near;
+  return best < 0 ? std::vector<int>() : memory_.SlotsNear(best, kNearLevels);
 }
 
 void MemorySystem::Learn() {
@@ -299,17 +295,15 @@ void MemorySystem::Relinked(int a, int b) {
 }
 
 void MemorySystem::Reference(const FilterUnit& unit, const Signature& signature) {
-  const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    members_[unit.members[p]].vocabulary().AddReferences(parts[p]);
-  }
+  ForEachPart(unit, signature, [this](std::size_t member, const Signature& part) {
+    members_[member].vocabulary().AddReferences(part);
+  });
 }
 
 void MemorySystem::Release(const FilterUnit& unit, const Signature& signature) {
-  const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    members_[unit.members[p]].vocabulary().RemoveReferences(parts[p]);
-  }
+  ForEachPart(unit, signature, [this](std::size_t member, const Signature& part) {
+    members_[member].vocabulary().RemoveReferences(part);
+  });
 }
 
 }  // namespace tutti::internal

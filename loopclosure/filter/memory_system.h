@@ -161,6 +161,12 @@ class MemorySystem {
   void CheckUnit(const FilterUnit& unit, const StateReader& in) const;
   void Restore(int slot, LocationStore& store);
   void ReadWord(std::size_t member, int word, LocationStore& store, cv::Mat& descriptors) const;
+  // Calls call(member, its part of the signature) for each member of a unit.
+  template <typename Call>
+  static void ForEachPart(const FilterUnit& unit, const Signature& signature, const Call& call) {
+    const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
+    for (std::size_t p = 0; p < parts.size(); ++p) call(unit.members[p], parts[p]);
+  }
   void Reference(const FilterUnit& unit, const Signature& signature);
   void Release(const FilterUnit& unit, const Signature& signature);
   bool LooksLikePrevious(int slot) const;

@@ -61,28 +61,20 @@ std::vector<int> MemorySystem::Retrieve(int best, LocationStore& store, std::str
 
 void MemorySystem::Restore(int slot, LocationStore& store) {
   const auto stored = store.Get(LocationStore::Kind::kSignature, number_, slot);
-  if (!stored) {
-    throw InputError(store.name() + ": is damaged (location " + std::to_string(memory_.id(slot)) +
-                     " is missing); give another file, or an older copy");
-  }
+  if (!stored) store.Damaged("location " + std::to_string(memory_.id(slot)) + " is missing");
   const std::vector<UnitRecord> records = ReadRecord(*stored, store.name());
   // First everything that may fail, then the changes.
   std::vector<std::vector<int>> words(members_.size());
   std::vector<cv::Mat> descriptors(members_.size());
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    const std::vector<Signature> parts =
-        records[u].signature.Split(static_cast<int>(units_[u].members.size()));
-    for (std::size_t p = 0; p < parts.size(); ++p) {
-      const std::size_t k = units_[u].members[p];
-      words[k] = members_[k].vocabulary().Missing(parts[p]);
+    ForEachPart(units_[u], records[u].signature, [&](std::size_t k, const Signature& part) {
+      words[k] = members_[k].vocabulary().Missing(part);
       for (const int word : words[k]) {
-        if (word >= members_[k].vocabulary().created()) {
-          throw InputError(store.name() + ": is damaged (a word that " + members_[k].name() +
-                           " never made); give another file, or an older copy");
-        }
+        if (word >= members_[k].vocabulary().created())
+          store.Damaged("a word that " + members_[k].name() + " never made");
         ReadWord(k, word, store, descriptors[k]);
       }
-    }
+    });
   }
   for (std::size_t k = 0; k < members_.size(); ++k) {
     members_[k].vocabulary().Restore(words[k], descriptors[k]);
@@ -104,10 +96,8 @@ void MemorySystem::ReadWord(std::size_t member, int word, LocationStore& store, 
     row = packed.Unpacked();
   }
   const bool fits = descriptors.empty() || (row.cols == descriptors.cols && row.type() == descriptors.type());
-  if (row.rows != 1 || !fits || !members_[member].vocabulary().Problem(row).empty()) {
-    throw InputError(store.name() + ": is damaged (word " + std::to_string(word) + " of " +
-                     members_[member].name() + "); give another file, or an older copy");
-  }
+  if (row.rows != 1 || !fits || !members_[member].vocabulary().Problem(row).empty())
+    store.Damaged("word " + std::to_string(word) + " of " + members_[member].name());
   descriptors.push_back(row);
 }
 
@@ -115,7 +105,7 @@ int MemorySystem::NextToTransfer(int best, const std::vector<int>& retrieved) co
   std::set<int> immune(retrieved.begin(), retrieved.end());
   if (best >= 0) {
     immune.insert(best);
-    for (const auto& [slot, level, loops] : memory_.Neighbours(best, kImmuneLevels)) immune.insert(slot);
+    for (const int slot : memory_.SlotsNear(best, kImmuneLevels)) immune.insert(slot);
   }
   return memory_.NextToTransfer(options_.recent_share, immune);
 }
@@ -123,14 +113,10 @@ int MemorySystem::NextToTransfer(int best, const std::vector<int>& retrieved) co
 void MemorySystem::Store(int slot, LocationStore& store) const {
   StoreSignatures(slot, store);
   for (const FilterUnit& unit : units_) {
-    const std::vector<Signature> parts =
-        unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
-    for (std::size_t p = 0; p < parts.size(); ++p) {
-      const std::size_t k = unit.members[p];
-      for (const int word : members_[k].vocabulary().WordsOnlyIn(parts[p])) {
-        StoreWord(members_[k].vocabulary(), k, word, store);
-      }
-    }
+    ForEachPart(unit, unit.likelihood.signature(slot), [&](std::size_t k, const Signature& part) {
+      const Vocabulary& vocabulary = members_[k].vocabulary();
+      for (const int word : vocabulary.WordsOnlyIn(part)) StoreWord(vocabulary, k, word, store);
+    });
   }
 }
 
@@ -167,14 +153,12 @@ void MemorySystem::StoreSignatures(int slot, LocationStore& store) const {
 void MemorySystem::Reopen(LocationStore& store) {
   LoadNodes(number_, store, memory_);
   for (int slot = 0; slot < memory_.size(); ++slot) {
-    const LocationState state = memory_.state(slot);
     for (FilterUnit& unit : units_) {
       unit.likelihood.Add(Signature());
       unit.likelihood.Remove(slot);
-      if (unit.is_dense) unit.dense.AddAbsent(state == LocationState::kMerged);
+      if (unit.is_dense) unit.dense.AddAbsent(memory_.state(slot) == LocationState::kMerged);
     }
-    if (state != LocationState::kShortTerm && state != LocationState::kWorking) continue;
-    Restore(slot, store);
+    if (memory_.Holds(slot)) Restore(slot, store);
   }
   for (FilterUnit& unit : units_) {
     if (unit.is_dense) unit.dense.FinishLoading();
@@ -250,15 +234,12 @@ void MemorySystem::CheckUnit(const FilterUnit& unit, const StateReader& in) cons
     in.Damaged("locations are missing");
   }
   for (int slot = 0; slot < memory_.size(); ++slot) {
-    const LocationState state = memory_.state(slot);
-    const bool in_memory = state == LocationState::kShortTerm || state == LocationState::kWorking;
+    const bool in_memory = memory_.Holds(slot);
     if (unit.likelihood.Has(slot) != in_memory || (unit.is_dense && unit.dense.Has(slot) != in_memory))
       in.Damaged("locations in memory without their words");
-    const std::vector<Signature> parts =
-        unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
-    for (std::size_t p = 0; p < parts.size(); ++p) {
-      if (!members_[unit.members[p]].vocabulary().Missing(parts[p]).empty()) in.Damaged("words are missing");
-    }
+    ForEachPart(unit, unit.likelihood.signature(slot), [&](std::size_t member, const Signature& part) {
+      if (!members_[member].vocabulary().Missing(part).empty()) in.Damaged("words are missing");
+    });
   }
 }
 

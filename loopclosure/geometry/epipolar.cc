@@ -13,12 +13,12 @@ constexpr std::size_t kMinMatches = 8;
 
 cv::UsacParams Usac(const EpipolarSettings& settings, double threshold) {
   cv::UsacParams parameters;
-  parameters.confidence = settings.confidence;
+  parameters.confidence = 0.9999;
   parameters.isParallel = false;
   parameters.loIterations = 10;
   parameters.loMethod = cv::LOCAL_OPTIM_INNER_LO;
   parameters.loSampleSize = 14;
-  parameters.maxIterations = settings.max_iterations;
+  parameters.maxIterations = 1000;
   parameters.neighborsSearch = cv::NEIGH_GRID;
   parameters.randomGeneratorState = static_cast<int>(settings.seed & 0x7fffffff);
   parameters.sampler = cv::SAMPLING_UNIFORM;

@@ -13,8 +13,6 @@ namespace tutti::internal {
 
 struct EpipolarSettings {
   double threshold_px = 1.5;
-  double confidence = 0.9999;
-  int max_iterations = 1000;
   std::uint64_t seed = 1;
 };
 

@@ -39,29 +39,24 @@ std::string TooFew(const char* what, std::size_t have, int need) {
 
 // RANSAC with a truncated-squares score (MSAC, Torr & Zisserman 2000) and a generator of its own.
 
-struct RansacSettings {
-  int sample_size = 3;
-  int max_iterations = 1000;
-  double confidence = 0.9999;
-  std::uint64_t seed = 1;
-};
+constexpr int kSample = 3;  // matches that a model is fitted to
 
 // `fit(sample)` gives the models through the sampled indices; `error(model, i)` the squared error of datum i
 // relative to the squared threshold (1 = at the threshold; infinity where impossible). Returns the inliers
 // of the best model and sets `best`. Deterministic for a seed: the generator is local and the draws do not
 // depend on the standard library.
 template <typename Model, typename Fit, typename Error>
-std::vector<int> Ransac(int count, const RansacSettings& settings, const Fit& fit, const Error& error,
+std::vector<int> Ransac(int count, const RelativePoseOptions& options, const Fit& fit, const Error& error,
                         Model& best) {
   std::vector<int> best_inliers;
-  if (count < settings.sample_size) return best_inliers;
-  std::mt19937_64 generator(settings.seed);
+  if (count < kSample) return best_inliers;
+  std::mt19937_64 generator(options.seed);
   double best_cost = static_cast<double>(count);
-  int needed = settings.max_iterations;
+  int needed = options.max_iterations;
   std::vector<int> sample;
   for (int iteration = 0; iteration < needed; ++iteration) {
     sample.clear();
-    while (static_cast<int>(sample.size()) < settings.sample_size) {
+    while (static_cast<int>(sample.size()) < kSample) {
       const int i = static_cast<int>(generator() % static_cast<std::uint64_t>(count));
       if (std::find(sample.begin(), sample.end(), i) == sample.end()) sample.push_back(i);
     }
@@ -76,10 +71,10 @@ std::vector<int> Ransac(int count, const RansacSettings& settings, const Fit& fi
         if (error(model, i) < 1.0) best_inliers.push_back(i);
       }
       const double share = static_cast<double>(best_inliers.size()) / count;
-      const double miss = 1.0 - std::pow(share, settings.sample_size);
+      const double miss = 1.0 - std::pow(share, kSample);
       if (miss <= 0.0) return best_inliers;
-      const double wanted = std::ceil(std::log(1.0 - settings.confidence) / std::log(miss));
-      needed = static_cast<int>(std::min<double>(settings.max_iterations, std::max(20.0, wanted)));
+      const double wanted = std::ceil(std::log(1.0 - options.confidence) / std::log(miss));
+      needed = static_cast<int>(std::min<double>(options.max_iterations, std::max(20.0, wanted)));
     }
   }
   return best_inliers;
@@ -328,9 +323,8 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
   for (const Eigen::Vector2d& pixel : pixels) problem.pixels.push_back(UndistortedPixel(camera, pixel));
 
   const double squared = options.threshold_px * options.threshold_px;
-  const RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
   result.inliers = Ransac<Pose>(
-      static_cast<int>(points.size()), settings,
+      static_cast<int>(points.size()), options,
       [&](const std::vector<int>& sample) { return FitP3p(problem, sample); },
       [&](const Pose& pose, int i) {
         const std::size_t k = internal::Index(i);
@@ -373,10 +367,9 @@ SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
   for (const Eigen::Vector2d& pixel : pixels_b) problem.pixels_b.push_back(UndistortedPixel(camera_b, pixel));
 
   const double squared = options.threshold_px * options.threshold_px;
-  const RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
   ScoredSimilarity best;
   result.inliers = Ransac<ScoredSimilarity>(
-      static_cast<int>(n), settings,
+      static_cast<int>(n), options,
       [&](const std::vector<int>& sample) { return FitSimilarity(problem, sample); },
       [&](const ScoredSimilarity& model, int i) {
         return SimilarityError(problem, model.S_a_b, model.S_b_a, internal::Index(i)) / squared;

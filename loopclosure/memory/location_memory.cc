@@ -210,6 +210,13 @@ std::vector<LocationMemory::Neighbour> LocationMemory::Neighbours(int slot, int 
   return Walk(slot, levels, [](LocationState state) { return state == LocationState::kWorking; });
 }
 
+std::vector<int> LocationMemory::SlotsNear(int slot, int levels) const {
+  std::vector<int> slots;
+  for (const Neighbour& near : Neighbours(slot, levels)) slots.push_back(near.slot);
+  std::sort(slots.begin(), slots.end());
+  return slots;
+}
+
 template <typename Walkable>
 std::vector<LocationMemory::Neighbour> LocationMemory::Walk(int slot, int levels,
                                                             const Walkable& walkable) const {

@@ -128,6 +128,10 @@ class LocationMemory {
   const std::deque<int>& short_term_memory() const { return short_term_; }
   /// Where a slot is. This and the next three: `slot` in 0 .. size() - 1.
   LocationState state(int slot) const { return nodes_[internal::Index(slot)].state; }
+  /// True for a slot in STM or WM: what it looks like is in memory.
+  bool Holds(int slot) const {
+    return state(slot) == LocationState::kShortTerm || state(slot) == LocationState::kWorking;
+  }
   /// A slot's links to others, in the order in which they were added.
   const std::vector<Link>& links(int slot) const { return nodes_[internal::Index(slot)].links; }
   /// How often a place was seen: the locations that rehearsal or a loop merged into it.
@@ -143,6 +147,8 @@ class LocationMemory {
   /// level, then slot. Odometry links count 1, loop links 0, of which a walk takes kMostLoopsOfAWalk. Only WM
   /// is walked.
   std::vector<Neighbour> Neighbours(int slot, int levels) const;
+  /// The slots of Neighbours, ascending.
+  std::vector<int> SlotsNear(int slot, int levels) const;
 
  private:
   struct Node {

@@ -44,6 +44,10 @@ class LocationStore {
   void Commit();
   /// Takes back everything since Begin; never throws.
   void Rollback() noexcept;
+  /// All that `puts` does as one step. Throws what it throws: then nothing is stored.
+  void InOneStep(const std::function<void()>& puts);
+  /// Throws InputError: the file is damaged, for `what`.
+  [[noreturn]] void Damaged(const std::string& what) const;
 
   /// Stores a record, in place of an older one.
   void Put(Kind kind, std::int64_t a, std::int64_t b, std::string_view bytes);

@@ -14,7 +14,6 @@
 #include "core/index.h"
 #include "loopclosure/features/scratch_pool.h"
 #include "loopclosure/features/surf_hessian.h"
-#include "loopclosure/features/surf_integral.h"
 #include "loopclosure/store/packed_mat.h"
 #include "tutti/loopclosure/features.h"
 

@@ -1,8 +1,8 @@
 #include "loopclosure/detector/hypothesis_search.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <gmock/gmock.h>
 #include <functional>
 #include <map>
 #include <vector>

@@ -210,9 +210,6 @@ TEST(DenseMember, NaiveHasNoUseForIt) {
   options.members = {"orb", "hog"};
   options.rule = CombinationRule::kNaive;
   EXPECT_NE(options.Validate().find("'hog' has none"), std::string::npos);
-  options = LoopDetectorOptions();
-  options.dense_members = {"mine"};
-  EXPECT_NE(options.Validate().find("external_members"), std::string::npos);
 }
 
 TEST(GradientDescriptor, KnowsNoLightAndLeavesOutWhatIsMasked) {

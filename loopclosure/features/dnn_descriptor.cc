@@ -1,6 +1,5 @@
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -11,7 +10,6 @@
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 #include "core/byte_stream.h"
@@ -211,12 +209,8 @@ DnnDescriptor::DnnDescriptor(const DnnOptions& options) : network_(std::make_sha
 cv::Mat DnnDescriptor::Describe(const cv::Mat& image, const cv::Mat& grey, const cv::Mat& mask) const {
   if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return {};
   const DnnOptions& options = network_->options;
-  cv::Mat seen = InColour(image, grey);
-  if (!mask.empty() && mask.size() == seen.size()) {
-    if (cv::countNonZero(mask) == 0) return {};
-    seen = seen.clone();
-    seen.setTo(cv::mean(seen, mask), mask == 0);
-  }
+  const cv::Mat seen = WithoutMasked(InColour(image, grey), mask);
+  if (seen.empty()) return {};
   const bool smaller = options.width <= seen.cols && options.height <= seen.rows;
   cv::Mat sized;
   cv::resize(seen, sized, cv::Size(options.width, options.height), 0, 0,

@@ -65,6 +65,14 @@ Histograms Relative(Histograms histograms) {
 
 }  // namespace
 
+cv::Mat WithoutMasked(const cv::Mat& image, const cv::Mat& mask) {
+  if (mask.empty() || mask.size() != image.size()) return image;
+  if (cv::countNonZero(mask) == 0) return {};
+  cv::Mat seen = image.clone();
+  seen.setTo(cv::mean(image, mask), mask == 0);
+  return seen;
+}
+
 cv::Mat NormalisedDescriptor(const cv::Mat& descriptor) {
   if (descriptor.empty()) return {};
   const double length = cv::norm(descriptor);
@@ -74,12 +82,8 @@ cv::Mat NormalisedDescriptor(const cv::Mat& descriptor) {
 
 cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask) {
   if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return {};
-  cv::Mat seen = grey;
-  if (!mask.empty() && mask.size() == grey.size()) {
-    if (cv::countNonZero(mask) == 0) return {};
-    seen = grey.clone();
-    seen.setTo(cv::mean(grey, mask), mask == 0);
-  }
+  const cv::Mat seen = WithoutMasked(grey, mask);
+  if (seen.empty()) return {};
   cv::Mat small;
   cv::resize(seen, small, cv::Size(kWidth, kHeight), 0, 0, cv::INTER_AREA);
   small.convertTo(small, CV_32F);

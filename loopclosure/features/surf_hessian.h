@@ -2,7 +2,6 @@
 #pragma once
 
 #include <dlib/geometry.h>
-#include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>

@@ -18,6 +18,10 @@ constexpr int kMinSide = 16;  ///< smaller images hold no feature of any member 
 /// (CV_8UC1 of the same size, or empty) is 0 nothing counts.
 cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask = cv::Mat());
 
+/// The image with the mean of the rest where the mask (CV_8UC1; empty or of another size: none) is 0; empty
+/// if that is everywhere.
+cv::Mat WithoutMasked(const cv::Mat& image, const cv::Mat& mask);
+
 /// A descriptor (1 x D, CV_32F) at length 1, in a matrix of its own; empty for one of no length or of none.
 cv::Mat NormalisedDescriptor(const cv::Mat& descriptor);
 

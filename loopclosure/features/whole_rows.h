@@ -11,8 +11,7 @@
 namespace tutti::internal {
 
 /// Descriptors as whole numbers of 16 bits: SIFT's values are such, SURF's are, times 128^2
-/// (store/packed_mat.h). Their scalar products are exact, in any order, and so are the same on every
-/// machine.
+/// (store/packed_mat.h). Their scalar products are exact, in any order, and so are the same on every machine.
 class WholeRows {
  public:
   /// Makes whole numbers of signed squares.

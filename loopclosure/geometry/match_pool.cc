@@ -39,9 +39,8 @@ void AppendMatches(const View::Set& query, const View::Set& candidate, const std
   }
 }
 
-// All members find the same corners: one match per place in either image, so
-// that inliers count independent evidence. The caller's come first (the SLAM
-// map hangs on them), then the most certain.
+// All members find the same corners: one match per place in either image, so that inliers count independent
+// evidence. The caller's come first (the SLAM map hangs on them), then the most certain.
 std::vector<PooledMatch> OnePerPlace(std::vector<PooledMatch> pool) {
   constexpr float kCell = 4.0f;  // [px]
   std::stable_sort(pool.begin(), pool.end(), [](const PooledMatch& a, const PooledMatch& b) {

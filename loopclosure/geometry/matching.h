@@ -35,9 +35,8 @@ struct PooledMatch {
   float ratio = 1;             ///< of distances, by which the match was chosen
 };
 
-/// The features of all members and the caller's matched (ratio test and mutual
-/// check) and pooled, one match per place in either image, on at most `threads`
-/// threads.
+/// The features of all members and the caller's matched (ratio test and mutual check) and pooled, one match
+/// per place in either image, on at most `threads` threads.
 std::vector<PooledMatch> PoolMatches(const View& query, const View& candidate, double max_ratio, int threads);
 
 }  // namespace internal

@@ -1,7 +1,6 @@
 #include "loopclosure/geometry/motion.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <numeric>
 

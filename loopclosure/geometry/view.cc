@@ -130,14 +130,14 @@ void StateOfPoints(Archive& archive, std::size_t features, std::vector<Eigen::Ve
     is_known[i / 8] = static_cast<std::uint8_t>(is_known[i / 8] | 1U << i % 8);
     known.insert(known.end(), points[i].begin(), points[i].end());
   }
-  bool has_points = !points.empty();
-  archive(has_points, is_known, internal::Planes{&known});
+  std::uint64_t count = points.size();
+  archive(count, is_known, internal::Planes{&known});
   if constexpr (Archive::kReading) {
-    if (!has_points) features = 0;
-    if (is_known.size() != (features + 7) / 8) archive.Damaged("features without points");
-    points.assign(features, UnknownPoint());
+    if ((count != 0 && count != features) || is_known.size() != (count + 7) / 8)
+      archive.Damaged("features without points");
+    points.assign(count, UnknownPoint());
     auto next = known.begin();
-    for (std::size_t i = 0; i < features; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       if ((is_known[i / 8] & 1U << i % 8) == 0) continue;
       if (known.end() - next < 3) archive.Damaged("features without points");
       points[i] = {next[0], next[1], next[2]};

@@ -6,7 +6,6 @@
 #include <deque>
 #include <map>
 #include <set>
-#include <utility>
 #include <vector>
 
 #include "core/index.h"

@@ -40,7 +40,6 @@ class DescriptorIndex {
   virtual std::vector<TwoNearest> Search(const cv::Mat& descriptors) const = 0;
   /// A word's descriptor; nullptr if it is not in the index.
   virtual const std::uint8_t* Find(int word) const = 0;
-  /// Words in the index.
   virtual int size() const = 0;
   /// A loaded index goes on as the saved one would; it must be of the same kind, width and seed. `known`:
   /// descriptors that whoever loads it has, too (WordStorage::State).

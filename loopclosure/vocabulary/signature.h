@@ -1,7 +1,6 @@
 // What one member remembers of one image: which of its words were seen, and how often.
 #pragma once
 
-#include <utility>
 #include <vector>
 
 namespace tutti {

@@ -1,7 +1,6 @@
 #include "loopclosure/vocabulary/word_storage.h"
 
 #include <algorithm>
-#include <cstring>
 #include <string_view>
 #include <utility>
 
@@ -76,9 +75,8 @@ void WordStorage::State(Archive& archive, int type, const std::vector<PackedMat>
   const int width = static_cast<int>(row_bytes_ / Index(CV_ELEM_SIZE(type)));
   const KnownRows rows(known, type, width);
   std::vector<int> words;
-  std::vector<int>
-      steps;         // to a word's row among the known ones from that of the word before; 0: no such row
-  PackedMat others;  // the descriptors of words without a row
+  std::vector<int> steps;  // to a word's row among the known ones from the row before; 0: no such row
+  PackedMat others;        // the descriptors of words without a row
   if constexpr (!Archive::kReading) {
     RowIndex index(rows, row_bytes_);
     cv::Mat unknown(0, width, type);

@@ -90,7 +90,6 @@ class WordStorage {
   template <class Archive>
   void State(Archive& archive, int type, const std::vector<PackedMat>& known);
 
-  /// Words in it.
   int size() const { return static_cast<int>(row_of_word_.size()); }
   /// Row numbers are below this.
   int end() const { return static_cast<int>(words_.size()); }

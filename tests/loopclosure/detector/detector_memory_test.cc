@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tests/support/full_disk.h"

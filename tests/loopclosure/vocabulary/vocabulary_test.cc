@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <numeric>
-#include <random>
-
 #include "core/state_archive.h"
 #include "loopclosure/store/packed_mat.h"
 #include "loopclosure/vocabulary/signature.h"

@@ -59,7 +59,7 @@ class SavedDetector : public ::testing::Test {
   fs::path file_ = folder_ / "places.tutti";
 };
 
-// Of the second lap, all that can be merged into the first is.
+// All of the second lap that can be merged into the first is.
 TEST_F(SavedDetector, MergedLocationsAreForgottenAndTheirPlacesFoundInTheOlderOnes) {
   for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
     LoopDetectorOptions options = testing::SmallOptions();

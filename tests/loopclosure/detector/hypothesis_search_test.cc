@@ -182,7 +182,7 @@ TEST_F(OrderOfSearch, TheBestThatWasTriedIsToldThoughNothingIsAccepted) {
   EXPECT_EQ(result.reason, "reason of 10");
 }
 
-// Of a flat picture that is `size` / 20 as large in the candidate as in the query.
+// A flat picture is `size` / 20 as large in the candidate as in the query.
 std::vector<VerifiedMatch> MatchesOfAPicture(double size) {
   std::vector<VerifiedMatch> matches;
   for (int i = 0; i < 64; ++i) {

@@ -67,7 +67,7 @@ cv::Mat Noise(int seed, const cv::Size& size, double blur) {
   return noise;
 }
 
-// As the member has it: twice its quota of points.
+// The member asks for twice its quota of points.
 OrbOptions Default(const cv::Mat& image) { return OrbOptionsFor(image.size(), 800); }
 
 TEST(Orb, PointsAndDescriptorsAreThoseOfOpenCv) {

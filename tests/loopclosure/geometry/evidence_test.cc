@@ -120,7 +120,7 @@ TEST(ShareApart, IsOfTheFeaturesBeyondTheCellsAroundTheMatches) {
   EXPECT_DOUBLE_EQ(ShareApart(two, view, view), 39.0 / 48);
 }
 
-// Of a cell counts what both images have there.
+// What both images have in a cell counts.
 TEST(ShareApart, CountsTheFewerOfTheTwoImagesFeaturesAndTheCallersToo) {
   View query = Evenly(1, 1), candidate = Evenly(3, 0);
   EXPECT_DOUBLE_EQ(ShareApart(MatchIn(2, 3), query, candidate), 39.0 / 48);

@@ -74,7 +74,7 @@ int NearestRow(const cv::Mat& row, const cv::Mat& rows) {
   return nearest;
 }
 
-// As the header has it, one pair after the other.
+// This decides as the header has it, one pair after the other.
 std::vector<Match> MatchesOf(const cv::Mat& query, const cv::Mat& candidate,
                              const std::vector<cv::Point2f>& points) {
   std::vector<Match> matches;

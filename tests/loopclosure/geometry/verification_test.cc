@@ -213,7 +213,7 @@ TEST_P(Turned, OnTheSpotIsAcceptedByItsHomography) {
   }
 }
 
-// As if all points were on a plane that the camera looks at askance.
+// All points seem to be on a plane that the camera looks at askance.
 View SeeFlat(const Pose& T_world_camera, std::int64_t id, bool calibrated) {
   View view = See(Pose(), id, calibrated, false);
   View::Set& set = view.members[0];

@@ -38,7 +38,7 @@ class PlacesByHand {
     if (!Has(a) || !Has(b)) return 0;
     return At(a)->dot(*At(b));
   }
-  // Of the image that is `back` before the newest, over the places.
+  // The mean is that of the image that is `back` before the newest, over the places.
   double Mean(const std::vector<int>& places, int back) const {
     double sum = 0;
     int known = 0;

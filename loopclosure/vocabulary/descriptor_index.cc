@@ -33,12 +33,12 @@ namespace {
 
 constexpr int kTogether = 12;  // searches that take turns: enough to hide memory, few enough for the cache
 
-class KdForestIndex : public DescriptorIndex {
+class KdForestIndex : public internal::StoredIndex<KdForestIndex> {
  public:
   KdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed)
-      : dimensions_(dimensions),
-        checks_per_tree_(std::max(1, checks / trees)),
-        storage_(internal::Index(dimensions) * sizeof(float)) {
+      : StoredIndex(internal::Index(dimensions) * sizeof(float)),
+        dimensions_(dimensions),
+        checks_per_tree_(std::max(1, checks / trees)) {
     for (int t = 0; t < trees; ++t) {
       trees_.push_back({internal::KdTree(dimensions), internal::Shuffler(seed, t)});
     }
@@ -93,21 +93,6 @@ class KdForestIndex : public DescriptorIndex {
     return found;
   }
 
-  const std::uint8_t* Find(int word) const override {
-    const int row = storage_.RowOf(word);
-    return row < 0 ? nullptr : storage_.At(row);
-  }
-
-  int size() const override { return storage_.size(); }
-
-  void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) override {
-    StateOf(archive, known);
-  }
-  void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) override {
-    StateOf(archive, known);
-  }
-
- private:
   template <class Archive>
   void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
     storage_.State(archive, CV_32F, known);
@@ -118,6 +103,7 @@ class KdForestIndex : public DescriptorIndex {
     }
   }
 
+ private:
   // Each tree takes new words in an order of its own.
   struct GrownTree {
     internal::KdTree tree;
@@ -126,7 +112,6 @@ class KdForestIndex : public DescriptorIndex {
 
   int dimensions_;
   int checks_per_tree_;
-  internal::WordStorage storage_;
   std::vector<GrownTree> trees_;
 };
 
@@ -141,9 +126,10 @@ namespace {
 
 constexpr int kExactUpTo = 1000;  // below this an exact scan is as fast as the tries
 
-class HammingIndex : public DescriptorIndex {
+class HammingIndex : public internal::StoredIndex<HammingIndex> {
  public:
-  HammingIndex(int bytes, int tables, std::uint64_t seed) : bytes_(bytes), storage_(internal::Index(bytes)) {
+  HammingIndex(int bytes, int tables, std::uint64_t seed)
+      : StoredIndex(internal::Index(bytes)), bytes_(bytes) {
     std::mt19937_64 generator(seed);
     for (int t = 0; t < tables; ++t) tries_.emplace_back(bytes, generator);
   }
@@ -177,21 +163,6 @@ class HammingIndex : public DescriptorIndex {
     return found;
   }
 
-  const std::uint8_t* Find(int word) const override {
-    const int row = storage_.RowOf(word);
-    return row < 0 ? nullptr : storage_.At(row);
-  }
-
-  int size() const override { return storage_.size(); }
-
-  void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) override {
-    StateOf(archive, known);
-  }
-  void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) override {
-    StateOf(archive, known);
-  }
-
- private:
   // The order within a leaf changes no answer: words and descriptors are all.
   template <class Archive>
   void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
@@ -203,6 +174,7 @@ class HammingIndex : public DescriptorIndex {
     }
   }
 
+ private:
   TwoNearest SearchAll(const std::uint8_t* descriptor) const {
     constexpr int kBlock = 256;
     static_assert(internal::WordStorage::kRowsPerBlock % kBlock == 0);
@@ -234,7 +206,6 @@ class HammingIndex : public DescriptorIndex {
   }
 
   int bytes_;
-  internal::WordStorage storage_;
   std::vector<internal::BitTrie> tries_;
 };
 

@@ -47,12 +47,12 @@ class TopTwo : public flann::ResultSet<float> {
   TwoNearest nearest_;
 };
 
-class FlannIndex : public DescriptorIndex {
+class FlannIndex : public internal::StoredIndex<FlannIndex> {
  public:
   FlannIndex(int dimensions, int trees, int checks, std::uint64_t seed)
-      : dimensions_(Index(dimensions)),
-        checks_per_tree_(std::max(1, checks / trees)),
-        storage_(Index(dimensions) * sizeof(float)) {
+      : StoredIndex(Index(dimensions) * sizeof(float)),
+        dimensions_(Index(dimensions)),
+        checks_per_tree_(std::max(1, checks / trees)) {
     for (int t = 0; t < trees; ++t) trees_.push_back({nullptr, {}, internal::Shuffler(seed, t)});
   }
 
@@ -105,14 +105,6 @@ class FlannIndex : public DescriptorIndex {
 
   int size() const override { return size_; }
 
-  void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) override {
-    StateOf(archive, known);
-  }
-  void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) override {
-    StateOf(archive, known);
-  }
-
- private:
   template <class Archive>
   void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
     storage_.State(archive, CV_32F, known);
@@ -139,6 +131,7 @@ class FlannIndex : public DescriptorIndex {
     }
   }
 
+ private:
   // Each tree takes new words in an order of its own.
   void Insert(std::vector<int> rows, GrownTree& tree) {
     tree.shuffler.Shuffle(rows);
@@ -173,8 +166,7 @@ class FlannIndex : public DescriptorIndex {
 
   std::size_t dimensions_;
   int checks_per_tree_;
-  int size_ = 0;  // living words
-  internal::WordStorage storage_;
+  int size_ = 0;             // living words
   std::vector<char> alive_;  // by row number: found by searches; the dead ones stay in the trees
   std::vector<GrownTree> trees_;
 };

@@ -9,6 +9,7 @@
 
 #include "core/index.h"
 #include "loopclosure/store/packed_mat.h"
+#include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/word_map.h"
 
 namespace tutti::internal {
@@ -104,6 +105,28 @@ class WordStorage {
   ChunkedVector<int> words_;  // by row number, -1: free
   std::vector<int> free_;
   WordMap<int> row_of_word_;
+};
+
+/// An index whose words lie in a WordStorage. `Derived` has a template StateOf(archive, known).
+template <class Derived>
+class StoredIndex : public DescriptorIndex {
+ public:
+  const std::uint8_t* Find(int word) const override {
+    const int row = storage_.RowOf(word);
+    return row < 0 ? nullptr : storage_.At(row);
+  }
+  int size() const override { return storage_.size(); }
+  void State(StateWriter& archive, const std::vector<PackedMat>& known) override {
+    static_cast<Derived*>(this)->StateOf(archive, known);
+  }
+  void State(StateReader& archive, const std::vector<PackedMat>& known) override {
+    static_cast<Derived*>(this)->StateOf(archive, known);
+  }
+
+ protected:
+  explicit StoredIndex(std::size_t row_bytes) : storage_(row_bytes) {}
+
+  WordStorage storage_;
 };
 
 }  // namespace tutti::internal

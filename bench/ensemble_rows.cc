@@ -22,7 +22,7 @@
 #include "core/camera_text.h"
 #include "core/parallel.h"
 #include "data/synthetic/image_change.h"
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/evaluation.h"

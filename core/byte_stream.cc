@@ -42,12 +42,6 @@ std::uint64_t ByteReader::GetVarint() {
   Damaged("an impossible number");
 }
 
-int ByteReader::GetVarintIndex(int end) {
-  const std::uint64_t index = GetVarint();
-  if (end <= 0 || index >= static_cast<std::uint64_t>(end)) Damaged("an index out of range");
-  return static_cast<int>(index);
-}
-
 std::string ByteReader::GetString() {
   const std::size_t size = GetCount(1);
   return std::string(Take(size), size);
@@ -57,12 +51,6 @@ std::size_t ByteReader::GetCount(std::size_t least_bytes) {
   const auto count = Get<std::uint64_t>();
   if (count > bytes_.size() / std::max<std::size_t>(1, least_bytes)) Damaged("more entries than bytes");
   return static_cast<std::size_t>(count);
-}
-
-int ByteReader::GetIndex(int end) {
-  const auto index = Get<std::int32_t>();
-  if (index < 0 || index >= end) Damaged("an index out of range");
-  return index;
 }
 
 void ByteReader::Damaged(const std::string& what) const {

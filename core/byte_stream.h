@@ -77,8 +77,6 @@ class ByteReader {
     const std::uint64_t value = GetVarint();
     return static_cast<std::int64_t>(value >> 1 ^ (~(value & 1) + 1));
   }
-  /// GetVarint of a number below `end`.
-  int GetVarintIndex(int end);
   std::vector<float> GetPlanes();
   std::string GetString();
   /// `data` may be null where `size` is 0.
@@ -89,8 +87,6 @@ class ByteReader {
   std::string_view GetView(std::size_t size) { return {Take(size), size}; }
   /// A number of things that take at least `least_bytes` each.
   std::size_t GetCount(std::size_t least_bytes);
-  /// An index in [0, end).
-  int GetIndex(int end);
   bool AtEnd() const { return bytes_.empty(); }
   std::size_t Left() const { return bytes_.size(); }  ///< [bytes]
   const std::string& source() const { return source_; }

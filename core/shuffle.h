@@ -4,10 +4,9 @@
 #include <cstdint>
 #include <random>
 #include <sstream>
+#include <string>
 #include <utility>
 #include <vector>
-
-#include "core/byte_stream.h"
 
 namespace tutti::internal {
 
@@ -25,16 +24,17 @@ class Shuffler {
 
   void Shuffle(std::vector<int>& order) { internal::Shuffle(order, generator_); }
 
-  void Save(ByteWriter& out) const {
-    std::ostringstream state;
-    state << generator_;
-    out.PutString(state.str());
-  }
-  /// Throws InputError if it is damaged.
-  void Load(ByteReader& in) {
-    std::istringstream state(in.GetString());
-    state >> generator_;
-    if (!state) in.Damaged("the state of a random generator");
+  template <class Archive>
+  void State(Archive& archive) {
+    std::stringstream state;
+    if constexpr (!Archive::kReading) state << generator_;
+    std::string text = state.str();
+    archive(text);
+    if constexpr (Archive::kReading) {
+      state.str(text);
+      state >> generator_;
+      if (!state) archive.Damaged("the state of a random generator");
+    }
   }
 
  private:

@@ -13,11 +13,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <typeinfo>
 #include <unordered_map>
@@ -73,6 +75,16 @@ struct Planes {
   std::vector<float>* values;
 };
 
+/// Numbers of either sign that are small as a rule: seven bits a byte.
+struct SmallNumbers {
+  std::vector<int>* values;
+};
+
+/// Numbers from 0 on that grow: the steps between them, seven bits a byte.
+struct GrowingNumbers {
+  std::vector<int>* values;
+};
+
 template <class Archive, class T, class = void>
 struct HasStateMember : std::false_type {};
 template <class Archive, class T>
@@ -95,6 +107,8 @@ class StateWriter {
   void operator()(const T&... values) {
     (Put(values), ...);
   }
+  /// Bytes whose number is known when they are read.
+  void Raw(const void* data, std::size_t size) { out_.PutRaw(data, size); }
   /// What was written, which the writer has no more.
   std::string Take() { return out_.Take(); }
 
@@ -118,6 +132,18 @@ class StateWriter {
   }
   void Put(const std::string& text) { out_.PutString(text); }
   void Put(const Planes& planes) { out_.PutPlanes(*planes.values); }
+  void Put(const SmallNumbers& numbers) {
+    out_.PutVarint(numbers.values->size());
+    for (const int value : *numbers.values) out_.PutSignedVarint(value);
+  }
+  void Put(const GrowingNumbers& numbers) {
+    out_.PutVarint(numbers.values->size());
+    int least = 0;
+    for (const int value : *numbers.values) {
+      out_.PutVarint(static_cast<std::uint64_t>(value - least));
+      least = value + 1;
+    }
+  }
   template <class T, int R, int C>
   void Put(const Eigen::Matrix<T, R, C>& matrix) {
     static_assert(R > 0 && C > 0);
@@ -192,8 +218,13 @@ class StateReader {
       : in_(bytes, std::move(source)), shared_(shared) {}
 
   template <class... T>
-  void operator()(T&... values) {
+  void operator()(T&&... values) {
     (Get(values), ...);
+  }
+  void Raw(void* data, std::size_t size) { in_.GetRaw(data, size); }
+  /// Throws InputError unless so many bytes are left: asked before room is made for them.
+  void Need(std::uint64_t bytes) const {
+    if (bytes > in_.Left()) in_.Damaged("it ends too early");
   }
   /// Throws InputError if something is left.
   void ExpectEnd() const {
@@ -225,6 +256,30 @@ class StateReader {
   }
   void Get(std::string& text) { text = in_.GetString(); }
   void Get(Planes& planes) { *planes.values = in_.GetPlanes(); }
+  void Get(SmallNumbers& numbers) {
+    numbers.values->resize(GetShortCount());
+    for (int& value : *numbers.values) {
+      const std::int64_t read = in_.GetSignedVarint();
+      value = static_cast<int>(read);
+      if (value != read) in_.Damaged("an impossible number");
+    }
+  }
+  void Get(GrowingNumbers& numbers) {
+    numbers.values->resize(GetShortCount());
+    int least = 0;
+    for (int& value : *numbers.values) {
+      const std::uint64_t step = in_.GetVarint();
+      if (step >= static_cast<std::uint64_t>(std::numeric_limits<int>::max() - least))
+        in_.Damaged("an impossible number");
+      value = least + static_cast<int>(step);
+      least = value + 1;
+    }
+  }
+  std::size_t GetShortCount() {
+    const std::uint64_t count = in_.GetVarint();
+    Need(count);
+    return static_cast<std::size_t>(count);
+  }
   template <class T, int R, int C>
   void Get(Eigen::Matrix<T, R, C>& matrix) {
     in_.GetRaw(matrix.data(), sizeof(T) * R * C);
@@ -304,5 +359,23 @@ class StateReader {
   ByteReader in_;
   SharedObjectsIn* shared_;
 };
+
+/// The bytes of values that share no objects with others.
+template <class... T>
+std::string StateBytes(const T&... values) {
+  SharedObjectsOut shared;
+  StateWriter out(&shared);
+  out(values...);
+  return out.Take();
+}
+
+/// Reads what StateBytes gave. Throws InputError, with the name of the source, if it is anything else.
+template <class... T>
+void ReadStateBytes(std::string_view bytes, const std::string& source, T&&... values) {
+  SharedObjectsIn shared;
+  StateReader in(bytes, source, &shared);
+  in(values...);
+  in.ExpectEnd();
+}
 
 }  // namespace tutti::internal

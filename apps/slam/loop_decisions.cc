@@ -7,7 +7,7 @@
 #include "apps/slam/loop_closer.h"
 #include "apps/slam/loop_reach.h"
 #include "core/stopwatch.h"
-#include "loopclosure/filter/loop_probability.h"
+#include "loopclosure/detector/hypothesis_search.h"
 
 namespace tutti {
 namespace {

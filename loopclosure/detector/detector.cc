@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/index.h"
 #include "core/stopwatch.h"
 #include "loopclosure/detector/detector_file.h"
 #include "loopclosure/detector/detector_state.h"
+#include "loopclosure/detector/ensemble.h"
 #include "loopclosure/detector/hypothesis_search.h"
 #include "loopclosure/detector/long_term_memory.h"
-#include "loopclosure/detector/query_check.h"
 #include "loopclosure/geometry/verification.h"
 #include "tutti/core/error.h"
 
@@ -34,7 +35,13 @@ const char* ToString(ConstraintType type) {
 class LoopDetector::Impl {
  public:
   explicit Impl(const LoopDetectorOptions& options)
-      : state_(options), long_term_(state_), verifier_(options.verification, options.seed) {}
+      : state_(options),
+        long_term_(state_),
+        search_(
+            state_.options(), state_.memory(),
+            [verifier = GeometricVerifier(options.verification, options.seed)](
+                const View& a, const View& b, int threads) { return verifier.Verify(a, b, threads); },
+            [this](int slot) -> const View& { return state_.view(slot); }) {}
 
   LoopResult Detect(const LoopQuery& query);
   LoopResult Locate(const LoopQuery& query) const;
@@ -45,16 +52,10 @@ class LoopDetector::Impl {
  private:
   void FillCounts(const std::vector<Features>& features, LoopResult& result) const;
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
-  internal::HypothesisSearch::VerifyPair PairVerifier() const {
-    return [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); };
-  }
-  std::function<const View&(int)> ViewOfSlot() const {
-    return [this](int slot) -> const View& { return state_.view(slot); };
-  }
 
   internal::DetectorState state_;
   internal::LongTermMemory long_term_;
-  GeometricVerifier verifier_;
+  internal::HypothesisSearch search_;
 };
 
 LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
@@ -80,7 +81,7 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
 
   result.proposed = state_.reasoner().Proposes(combined, result);
   if (result.proposed) Verify(view, combined.belief, result);
-  state_.reasoner().VerifyAgain(PairVerifier(), ViewOfSlot(), result);
+  state_.reasoner().VerifyAgain(search_, result);
   result.verify_ms = watch.LapMs();
 
   state_.reasoner().Finish(result);
@@ -109,7 +110,7 @@ void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopRes
         "features with the query, or set verification.enabled: false";
     return;
   }
-  state_.reasoner().Verify(query, belief, PairVerifier(), ViewOfSlot(), result);
+  state_.reasoner().Verify(query, belief, search_, result);
 }
 
 // One image by itself, without the images before it: no filter, all places are as likely.
@@ -169,7 +170,7 @@ std::vector<LoopPlace> LoopDetector::Places() const {
   }
   std::vector<LoopPlace> places;
   for (int slot = 0; slot < state.memory().size(); ++slot) {
-    if (state.memory().state(slot) == LocationMemory::State::kMerged) continue;
+    if (state.memory().state(slot) == LocationState::kMerged) continue;
     const View view = state.HasView(slot) ? state.view(slot) : impl_->long_term().ViewOf(slot);
     LoopPlace place;
     place.id = view.id;
@@ -230,7 +231,7 @@ std::size_t LoopDetector::NumLocations() const {
   return memory.short_term_memory().size() + memory.working_memory().size();
 }
 std::size_t LoopDetector::NumLongTerm() const {
-  return static_cast<std::size_t>(impl_->state().memory().num_long_term());
+  return internal::Index(impl_->state().memory().num_long_term());
 }
 std::int64_t LoopDetector::LastId() const { return impl_->state().last_id(); }
 const LoopDetectorOptions& LoopDetector::options() const { return impl_->state().options(); }

@@ -16,17 +16,17 @@
 namespace tutti::internal {
 
 inline constexpr SectionFileKind kDetectorFile = {
-    {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'}, 9, "saved loop detector", "LoopDetector::Save"};
+    {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'}, 10, "saved loop detector", "LoopDetector::Save"};
 
 /// Writes all that a detector knows, its long-term memory with it; a file that is there is replaced only by a
 /// complete one. Throws InputError if it can't be written.
-void SaveDetector(const DetectorState& state, LongTermMemory& long_term, const std::filesystem::path& file);
+void SaveDetector(DetectorState& state, LongTermMemory& long_term, const std::filesystem::path& file);
 
 /// Whether the positions that came with queries (PosePrior) are kept: they mean nothing without the odometry
 /// that gave them.
 enum class Positions { kForget, kKeep };
-/// The same as sections of a file that holds more.
-void SaveDetector(const DetectorState& state, LongTermMemory& long_term, Positions positions,
+/// Gives what it would write as sections of a file that holds more.
+void SaveDetector(DetectorState& state, LongTermMemory& long_term, Positions positions,
                   const SectionSink& out);
 
 /// Tags of a section that holds the vocabulary of a member, and of one that holds the view of a location.
@@ -53,11 +53,7 @@ class SavedDetector {
 
  private:
   void ReadOptions();
-  template <typename Take>
-  void Read(const std::string& content, const Take& take) const;
-  template <typename Take>
-  void Load(std::uint32_t section, const Take& take);  // the next one
-  std::map<int, View> LoadViews();                     // by slot
+  std::map<int, View> LoadViews();  // by slot
   void LoadRest(DetectorState& state, LongTermMemory& long_term);
 
   std::unique_ptr<SectionReader> own_;  // null: somebody else's

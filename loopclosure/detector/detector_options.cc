@@ -4,7 +4,6 @@
 
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
-#include "tutti/loopclosure/features.h"
 
 namespace tutti {
 namespace {
@@ -101,13 +100,6 @@ std::vector<std::string> KnownMembers() {
   std::vector<std::string> names = KnownFeatureTypes();
   const std::vector<std::string> dense = KnownDenseMembers();
   names.insert(names.end(), dense.begin(), dense.end());
-  return names;
-}
-
-std::vector<std::string> KnownFeatureTypes() {
-  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze"};
-  const std::vector<std::string> registered = RegisteredFeatureTypes();
-  names.insert(names.end(), registered.begin(), registered.end());
   return names;
 }
 

@@ -3,13 +3,12 @@
 #include <utility>
 
 #include "core/byte_stream.h"
-#include "loopclosure/geometry/view_bytes.h"
+#include "core/state_archive.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
 
 using Kind = LocationStore::Kind;
-using State = LocationMemory::State;
 
 const View& DetectorState::Remember(const LoopQuery& query, View view, const std::vector<SeenWords>& words) {
   last_id_ = query.id;
@@ -47,46 +46,21 @@ void DetectorState::LoadView(int slot, View view, const std::string& source) {
 }
 
 void DetectorState::StoreView(int slot, LocationStore& store) const {
-  ByteWriter record;
-  SaveView(view(slot), record);
-  store.Put(Kind::kView, 0, slot, record.bytes());
+  store.Put(Kind::kView, 0, slot, StateBytes(view(slot)));
 }
 
 View DetectorState::StoredView(int slot, LocationStore& store) const {
   const auto record = store.Get(Kind::kView, 0, slot);
   if (!record) {
-    throw InputError(store.name() + ": is damaged (the features of location " +
-                     std::to_string(memory().id(slot)) +
-                     " are missing); give another file, or an older copy");
+    store.Damaged("the features of location " + std::to_string(memory().id(slot)) + " are missing");
   }
-  ByteReader in(*record, store.name());
-  return internal::LoadView(in);
+  View view;
+  ReadStateBytes(*record, store.name(), view);
+  return view;
 }
 
 void DetectorState::FetchView(int slot, LocationStore& store) {
   LoadView(slot, StoredView(slot, store), store.name());
-}
-
-std::string DetectorState::Statistics() const {
-  ByteWriter out;
-  out.Put(last_id_);
-  out.Put<std::int32_t>(callers_descriptors_.type);
-  out.Put<std::int32_t>(callers_descriptors_.width);
-  for (const Member& member : members()) member.SaveStatistics(out);
-  reasoner_.SaveStatistics(out);
-  return out.bytes();
-}
-
-void DetectorState::LoadStatistics(ByteReader& in) {
-  last_id_ = in.Get<std::int64_t>();
-  callers_descriptors_.type = in.Get<std::int32_t>();
-  callers_descriptors_.width = in.Get<std::int32_t>();
-  const int type = callers_descriptors_.type;
-  if (last_id_ < -1 || (type != -1 && type != CV_8U && type != CV_32F)) {
-    in.Damaged("the detector's statistics");
-  }
-  for (Member& member : ensemble_.members()) member.LoadStatistics(in);
-  reasoner_.LoadStatistics(in);
 }
 
 void DetectorState::CheckMemories(const std::string& source) const {
@@ -101,8 +75,7 @@ void DetectorState::CheckMemories(const std::string& source) const {
     }
   }
   for (int slot = 0; slot < size; ++slot) {
-    const State state = memory().state(slot);
-    if (reasoner_.InMemory(slot) != (state == State::kShortTerm || state == State::kWorking)) {
+    if (reasoner_.InMemory(slot) != memory().Holds(slot)) {
       in.Damaged("a location that is in no memory");
     }
   }

@@ -8,7 +8,6 @@
 #include "core/index.h"
 #include "loopclosure/detector/ensemble.h"
 #include "loopclosure/detector/place_reasoner.h"
-#include "loopclosure/detector/query_check.h"
 #include "loopclosure/geometry/verification.h"
 #include "loopclosure/store/location_store.h"
 #include "tutti/loopclosure/detector.h"
@@ -33,7 +32,7 @@ class DetectorState {
   const PlaceReasoner& reasoner() const { return reasoner_; }
   /// All locations: those of the shared memory, or what is in any member's.
   const LocationMemory& memory() const { return reasoner_.memory(); }
-  /// Of the newest query, -1 if there was none.
+  /// Id of the newest query, -1 if there was none.
   std::int64_t last_id() const { return last_id_; }
   const CallersDescriptors& callers_descriptors() const { return callers_descriptors_; }
 
@@ -59,9 +58,17 @@ class DetectorState {
   void FetchView(int slot, LocationStore& store);
 
   /// Running figures: all but vocabularies, memories, filters and views.
-  std::string Statistics() const;
-  /// Takes up what Statistics gave. Throws InputError if it is damaged.
-  void LoadStatistics(ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(last_id_, callers_descriptors_.type, callers_descriptors_.width);
+    if constexpr (Archive::kReading) {
+      const int type = callers_descriptors_.type;
+      if (last_id_ < -1 || (type != -1 && type != CV_8U && type != CV_32F))
+        archive.Damaged("the detector's statistics");
+    }
+    for (Member& member : ensemble_.members()) archive(member);
+    archive(reasoner_);
+  }
   /// After loading: throws InputError, with the name of the source, if the memories are not about the same
   /// locations, or the last one is not last_id().
   void CheckMemories(const std::string& source) const;

@@ -1,11 +1,10 @@
 #include "loopclosure/detector/hypothesis_search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/index.h"
-#include "loopclosure/detector/nearest_view.h"
-#include "loopclosure/filter/loop_probability.h"
 #include "loopclosure/filter/transition_model.h"
 
 namespace tutti::internal {
@@ -39,9 +38,8 @@ std::vector<int> HypothesisSearch::TopPlaces(const Belief& belief) const {
     if (places.size() == wanted) break;
     if (std::find(covered.begin(), covered.end(), slot) != covered.end()) continue;
     places.push_back(slot);
-    for (const auto& [near, level, loops] : memory_.Neighbours(slot, 1 + options_.verification.neighbours)) {
-      covered.push_back(near);
-    }
+    const std::vector<int> near = memory_.SlotsNear(slot, 1 + options_.verification.neighbours);
+    covered.insert(covered.end(), near.begin(), near.end());
   }
   return places;
 }
@@ -128,13 +126,13 @@ void HypothesisSearch::Reconsider(const Belief& belief, LoopResult& result) cons
 Verification HypothesisSearch::WithMatches(int query, const Verification& verification) const {
   if (!verification.inlier_matches.empty()) return verification;
   const int slot = memory_.Find(verification.candidate);
-  if (memory_.state(slot) != LocationMemory::State::kWorking) return verification;  // its view may be gone
+  if (memory_.state(slot) != LocationState::kWorking) return verification;  // its view may be gone
   Verification full = verify_(view_of_(query), view_of_(slot), options_.threads);
   full.mass = verification.mass;
   return full;
 }
 
-// Of the places that geometry finds similar the most probable, and of its views the nearest.
+// Chooses the most probable of the places that geometry finds similar, and the nearest of its views.
 void HypothesisSearch::Decide(const View& query, const Belief& belief, LoopResult& result) const {
   constexpr double kWorthASearch = 0.5;  // probability: below, no other view of the place makes it a loop
   Weigh(belief, result);
@@ -159,7 +157,7 @@ void HypothesisSearch::Decide(const View& query, const Belief& belief, LoopResul
     result.verification = *Tried(memory_.Find(found.candidate), result);
 }
 
-// Of what geometry finds similar, with its probability; null and -1 if it finds nothing.
+// What geometry finds similar, with its probability; null and -1 if it finds nothing.
 std::pair<const Verification*, double> HypothesisSearch::MostProbable(const LoopResult& result) {
   std::pair<const Verification*, double> most(nullptr, -1);
   for (const Verification& tried : result.tried) {
@@ -170,7 +168,7 @@ std::pair<const Verification*, double> HypothesisSearch::MostProbable(const Loop
   return most;
 }
 
-// The same as Try, but what was tried at first has no matches any more: they are found again.
+// Does what Try does, but what was tried at first has no matches any more: they are found again.
 const Verification& HypothesisSearch::TryWithMatches(const View& query, int candidate,
                                                      LoopResult& result) const {
   const Verification& tried = Try(query, candidate, result);
@@ -204,6 +202,13 @@ std::vector<int> HypothesisSearch::ViewsOf(int place, const Belief& belief) cons
   if (views.size() > kMostNeighbours) views.resize(kMostNeighbours);
   views.insert(views.begin(), place);
   return views;
+}
+
+double LoopProbability(const Verification& verification) {
+  const double mass = std::clamp(verification.mass, 1e-4, 1.0 - 1e-4);
+  const double sure = std::clamp(-verification.log_nfa, 0.0, 300.0) / 100.0;
+  const double logit = 3.345 + 1.379 * std::log(mass / (1.0 - mass)) + 0.889 * sure;
+  return 1.0 / (1.0 + std::exp(-logit));
 }
 
 }  // namespace tutti::internal

@@ -1,4 +1,4 @@
-#include "loopclosure/detector/nearest_view.h"
+#include "loopclosure/detector/hypothesis_search.h"
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -106,7 +106,7 @@ std::vector<int> OnThePath(const LocationMemory& memory, int slot) {
   std::vector<int> slots;
   for (const LocationMemory::Link& link : memory.links(slot)) {
     if (link.type == LocationMemory::LinkType::kOdometry &&
-        memory.state(link.slot) == LocationMemory::State::kWorking)
+        memory.state(link.slot) == LocationState::kWorking)
       slots.push_back(link.slot);
   }
   return slots;

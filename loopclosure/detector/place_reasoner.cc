@@ -5,13 +5,11 @@
 
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "loopclosure/filter/loop_probability.h"
+#include "loopclosure/detector/hypothesis_search.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
 namespace {
-
-using State = LocationMemory::State;
 
 std::vector<std::vector<std::size_t>> UnitsOf(const LoopDetectorOptions& options) {
   std::vector<std::vector<std::size_t>> units;
@@ -105,7 +103,8 @@ void PlaceReasoner::NoteStep() {
   // Published methods, whose evidence is another one, know no second word.
   const bool second_word = Shared() && options_.evidence.kind == EvidenceKind::kCounts;
   const PlaceFilter* filter = second_word ? systems_.front()->Deciding() : nullptr;
-  if (filter == nullptr || memory().state(newest) != State::kShortTerm || memory().working_memory().empty())
+  if (filter == nullptr || memory().state(newest) != LocationState::kShortTerm ||
+      memory().working_memory().empty())
     return;
   second_word_.Step(newest, filter->filter.posterior(), filter->image_likelihood);
 }
@@ -151,23 +150,15 @@ CandidateEvidence PlaceReasoner::EvidenceAt(int slot, const std::vector<double>&
 
 void PlaceReasoner::FillOpinion(std::size_t member, const CombinedBelief& combined,
                                 MemberOpinion& opinion) const {
-  const MemorySystem* system = nullptr;
-  std::size_t unit_number = 0;
-  for (const auto& candidate : systems_) {
-    for (std::size_t u = 0; u < candidate->units().size(); ++u) {
-      const std::vector<std::size_t>& of_unit = candidate->units()[u].members;
-      if (std::find(of_unit.begin(), of_unit.end(), member) == of_unit.end()) continue;
-      system = candidate.get();
-      unit_number = u;
-    }
-  }
-  if (system == nullptr) return;
-  const FilterUnit& unit = system->units()[unit_number];
+  const std::size_t number = options_.rule == CombinationRule::kNaive ? 0 : member;  // of UnitsOf
+  const MemorySystem& system = *systems_[Shared() ? 0 : number];
+  const std::size_t of_system = Shared() ? number : 0;
+  const FilterUnit& unit = system.units()[of_system];
   opinion.took_part = unit.took_part();
   if (!unit.took_part()) return;
   const Belief& posterior = unit.filter.posterior();
   opinion.hypothesis = posterior.Hypothesis();
-  opinion.weight = options_.rule == CombinationRule::kJoint ? system->WeightOf(unit_number) : 1.0;
+  opinion.weight = options_.rule == CombinationRule::kJoint ? system.WeightOf(of_system) : 1.0;
   const int best = posterior.Best();
   if (best >= 0) opinion.best = memory().id(best);
   if (combined.best >= 0) opinion.at_candidate = PosteriorAt(posterior, combined.best);
@@ -199,15 +190,14 @@ bool PlaceReasoner::Proposes(const CombinedBelief& combined, LoopResult& result)
   return true;
 }
 
-void PlaceReasoner::Verify(const View& query, const Belief& belief,
-                           const HypothesisSearch::VerifyPair& verify,
-                           const std::function<const View&(int)>& view_of, LoopResult& result) const {
+void PlaceReasoner::Verify(const View& query, const Belief& belief, const HypothesisSearch& search,
+                           LoopResult& result) const {
   if (!options_.verification.enabled) {
     result.verification.candidate = result.best;
     result.verification.similar = result.verification.accepted = true;
     result.probability = MassAround(belief, memory().Find(result.best), memory());
   } else {
-    HypothesisSearch(options_, memory(), verify, view_of).Verify(query, belief, result);
+    search.Verify(query, belief, result);
     if (result.verification.candidate >= 0) result.candidate = result.verification.candidate;
     if (!result.verification.similar) return;
   }
@@ -226,10 +216,8 @@ void PlaceReasoner::Verify(const View& query, const Belief& belief,
   result.reason = text;
 }
 
-void PlaceReasoner::VerifyAgain(const HypothesisSearch::VerifyPair& verify,
-                                const std::function<const View&(int)>& view_of, LoopResult& result) {
+void PlaceReasoner::VerifyAgain(const HypothesisSearch& search, LoopResult& result) {
   if (!options_.verification.enabled || !Shared()) return;
-  const HypothesisSearch search(options_, memory(), verify, view_of);
   result.late = second_word_.Say(options_, memory(), systems_.front()->transition(), search);
 }
 
@@ -280,10 +268,8 @@ bool PlaceReasoner::Merge(int slot, std::int64_t into) {
 }
 
 bool PlaceReasoner::InMemory(int slot) const {
-  return std::any_of(systems_.begin(), systems_.end(), [slot](const auto& system) {
-    const State state = system->memory().state(slot);
-    return state == State::kShortTerm || state == State::kWorking;
-  });
+  return std::any_of(systems_.begin(), systems_.end(),
+                     [slot](const auto& system) { return system->memory().Holds(slot); });
 }
 
 std::string PlaceReasoner::Fingerprint() const {
@@ -298,17 +284,6 @@ std::string PlaceReasoner::Fingerprint() const {
   text += options_.evidence.kind == EvidenceKind::kCounts ? ", counts" : ", standardised";
   text += Shared() ? ", shared memory" : ", a memory per member";
   return text;
-}
-
-void PlaceReasoner::SaveStatistics(ByteWriter& out) const {
-  out.Put(last_hypothesis_);
-  for (const auto& system : systems_) system->SaveLevels(out);
-}
-
-void PlaceReasoner::LoadStatistics(ByteReader& in) {
-  last_hypothesis_ = in.Get<double>();
-  if (!(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6)) in.Damaged("the detector's statistics");
-  for (auto& system : systems_) system->LoadLevels(in);
 }
 
 }  // namespace tutti::internal

@@ -44,12 +44,11 @@ class PlaceReasoner {
   bool Proposes(const CombinedBelief& combined, LoopResult& result);
   /// Step 6: geometry looks at the most probable places; fills verification, tried, accepted, probability and
   /// reason of `result`. Without verification the candidate is taken by its posterior alone.
-  void Verify(const View& query, const Belief& belief, const HypothesisSearch::VerifyPair& verify,
-              const std::function<const View&(int)>& view_of, LoopResult& result) const;
+  void Verify(const View& query, const Belief& belief, const HypothesisSearch& search,
+              LoopResult& result) const;
   /// Step 7: what is decided now of the image Hindsight::kImages before this one, into result.late; nothing
   /// if it stays as it was.
-  void VerifyAgain(const HypothesisSearch::VerifyPair& verify, const std::function<const View&(int)>& view_of,
-                   LoopResult& result);
+  void VerifyAgain(const HypothesisSearch& search, LoopResult& result);
   /// Links the places of a loop that is nearly certain.
   void Finish(const LoopResult& result);
 
@@ -64,10 +63,8 @@ class PlaceReasoner {
   /// All locations: those of the shared memory, or what is in any member's.
   const LocationMemory& memory() const { return Shared() ? systems_.front()->memory() : union_; }
   bool Shared() const { return systems_.size() == 1; }
-  std::vector<std::unique_ptr<MemorySystem>>& systems() { return systems_; }
   const std::vector<std::unique_ptr<MemorySystem>>& systems() const { return systems_; }
   LocationMemory& union_of_all() { return union_; }
-  const LocationMemory& union_of_all() const { return union_; }
   /// True if some memory has the slot in STM or WM.
   bool InMemory(int slot) const;
   /// What must be the same for stored locations to be of use.
@@ -75,15 +72,20 @@ class PlaceReasoner {
 
   /// Where the locations were taken.
   PoseTrack& track() { return track_; }
-  const PoseTrack& track() const { return track_; }
 
   /// What is kept for second words.
   SecondWord& second_word() { return second_word_; }
-  const SecondWord& second_word() const { return second_word_; }
 
-  /// Running figures: the state but memories, filters and track.
-  void SaveStatistics(ByteWriter& out) const;
-  void LoadStatistics(ByteReader& in);
+  /// Running figures: all but memories, filters, track and second words.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(last_hypothesis_);
+    if constexpr (Archive::kReading) {
+      if (!(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6))
+        archive.Damaged("the detector's statistics");
+    }
+    for (const auto& system : systems_) system->StateOfLevels(archive);
+  }
 
  private:
   void ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call);

@@ -1,38 +1,25 @@
 #include "loopclosure/detector/second_word.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
 namespace tutti::internal {
 namespace {
 
-using State = LocationMemory::State;
-
 // Below, a loop that was accepted is withdrawn. From here on, one is accepted where loops come in a row.
 constexpr double kEvenChance = 0.5;
 
-// Of a verification, what a decision needs: its matches, and the pose that they give, can be found again.
-void SaveFigures(const Verification& v, ByteWriter& out) {
-  out.Put(v.candidate);
-  out.Put<char>(v.similar ? 1 : 0);
-  out.Put<char>(v.accepted ? 1 : 0);
-  out.Put<std::int32_t>(static_cast<std::int32_t>(v.type));
-  out.Put<char>(v.homography ? 1 : 0);
-  for (const int count : {v.matches, v.inliers, v.coverage}) out.Put<std::int32_t>(count);
-  for (const double figure : {v.expected_inliers, v.log_nfa, v.motion_spread}) out.Put(figure);
-}
-
-Verification LoadFigures(ByteReader& in) {
-  Verification v;
-  v.candidate = in.Get<std::int64_t>();
-  v.similar = in.Get<char>() != 0;
-  v.accepted = in.Get<char>() != 0;
-  v.type = static_cast<ConstraintType>(in.GetIndex(static_cast<int>(ConstraintType::kSimilarity) + 1));
-  v.homography = in.Get<char>() != 0;
-  for (int* count : {&v.matches, &v.inliers, &v.coverage}) *count = in.Get<std::int32_t>();
-  for (double* figure : {&v.expected_inliers, &v.log_nfa, &v.motion_spread}) *figure = in.Get<double>();
-  return v;
+// What a decision needs of a verification: its matches, and the pose that they give, can be found again.
+template <class Archive>
+void StateOfFigures(Archive& archive, Verification& v) {
+  archive(v.candidate, v.similar, v.accepted, v.type, v.homography, v.matches, v.inliers, v.coverage,
+          v.expected_inliers, v.log_nfa, v.motion_spread);
+  if constexpr (Archive::kReading) {
+    archive.Check(static_cast<int>(v.type), 0, static_cast<int>(ConstraintType::kSimilarity) + 1,
+                  "a loop of an unknown kind");
+  }
 }
 
 bool Contains(const std::vector<int>& slots, int slot) {
@@ -41,11 +28,7 @@ bool Contains(const std::vector<int>& slots, int slot) {
 
 // Where the loops of the images before and after may lead, if this one leads to `place`.
 std::vector<int> Around(std::int64_t place, const LocationMemory& memory) {
-  std::vector<int> around;
-  for (const auto& [slot, level, loops] :
-       memory.Neighbours(memory.Find(place), kAboutHere + Hindsight::kImages))
-    around.push_back(slot);
-  return around;
+  return memory.SlotsNear(memory.Find(place), kAboutHere + Hindsight::kImages);
 }
 
 // Two of the images before close loops there. One may be an alias, and would drag the next along.
@@ -89,7 +72,7 @@ std::optional<LateLoop> SecondWord::Say(const LoopDetectorOptions& options, cons
   if (slot < 0 || first_.empty() || first_.front().slot != slot) return std::nullopt;
   LoopResult word = std::move(first_.front().result);
   first_.pop_front();
-  if (memory.state(slot) != State::kShortTerm && memory.state(slot) != State::kWorking) return std::nullopt;
+  if (!memory.Holds(slot)) return std::nullopt;
   const Belief belief = hindsight_.Smoothed(transition, memory.working_memory());
   const bool before = word.accepted;
   if (before) {
@@ -124,36 +107,31 @@ bool SecondWord::StillThere(const std::vector<int>& around, const LocationMemory
   });
 }
 
-void SecondWord::Save(ByteWriter& out) const {
-  hindsight_.Save(out);
-  out.Put<std::int32_t>(static_cast<std::int32_t>(first_.size()));
-  for (const First& first : first_) {
-    out.Put<std::int32_t>(first.slot);
-    out.Put(first.result.query);
-    out.Put<char>(first.result.accepted ? 1 : 0);
-    SaveFigures(first.result.verification, out);
-    out.Put<std::int32_t>(static_cast<std::int32_t>(first.result.tried.size()));
-    for (const Verification& tried : first.result.tried) SaveFigures(tried, out);
+template <class Archive>
+void SecondWord::First::State(Archive& archive) {
+  archive(slot, result.query, result.accepted);
+  StateOfFigures(archive, result.verification);
+  std::uint64_t tried = result.tried.size();
+  archive(tried);
+  for (std::size_t i = 0; i < tried; ++i) {
+    if constexpr (Archive::kReading) result.tried.emplace_back();
+    StateOfFigures(archive, result.tried[i]);
   }
 }
 
-void SecondWord::Load(const LocationMemory& memory, ByteReader& in) {
-  const int end = memory.size();
-  hindsight_.Load(end, in);
-  first_.clear();
-  for (int left = in.GetIndex(end + 1); left > 0; --left) {
-    First first{in.GetIndex(end), {}};
-    first.result.query = in.Get<std::int64_t>();
-    first.result.accepted = in.Get<char>() != 0;
-    first.result.verification = LoadFigures(in);
-    for (int tried = in.GetIndex(end + 1); tried > 0; --tried) first.result.tried.push_back(LoadFigures(in));
-    for (const Verification& tried : first.result.tried) {
-      if (memory.Find(tried.candidate) < 0) in.Damaged("a loop with an unknown location");
-    }
+template void SecondWord::First::State(StateWriter& archive);
+template void SecondWord::First::State(StateReader& archive);
+
+void SecondWord::Check(const LocationMemory& memory, const StateReader& in) const {
+  hindsight_.Check(memory.size(), in);
+  for (const First& first : first_) {
+    in.Check(first.slot, 0, memory.size(), "a loop of an unknown location");
     const std::int64_t chosen = first.result.verification.candidate;
     if (memory.id(first.slot) != first.result.query || (chosen >= 0 && memory.Find(chosen) < 0))
       in.Damaged("a loop of an unknown location");
-    first_.push_back(std::move(first));
+    for (const Verification& tried : first.result.tried) {
+      if (memory.Find(tried.candidate) < 0) in.Damaged("a loop with an unknown location");
+    }
   }
 }
 

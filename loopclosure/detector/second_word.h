@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/detector/hypothesis_search.h"
-#include "loopclosure/filter/hindsight.h"
+#include "loopclosure/filter/bayes_filter.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::internal {
@@ -31,14 +31,20 @@ class SecondWord {
   std::optional<LateLoop> Say(const LoopDetectorOptions& options, const LocationMemory& memory,
                               const TransitionModel& transition, const HypothesisSearch& search);
 
-  void Save(ByteWriter& out) const;
-  /// Takes up what Save wrote, of the locations of `memory`. Throws InputError if it is damaged.
-  void Load(const LocationMemory& memory, ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(hindsight_, first_);
+  }
+  /// Throws InputError unless what was read is of the locations of `memory`.
+  void Check(const LocationMemory& memory, const StateReader& in) const;
 
  private:
   struct First {
     int slot;
     LoopResult result;  // what geometry tried, without matches
+
+    template <class Archive>
+    void State(Archive& archive);
   };
   bool StillThere(const std::vector<int>& around, const LocationMemory& memory) const;
 

@@ -5,6 +5,8 @@
 #include <functional>
 #include <tuple>
 
+#include "core/index.h"
+
 namespace tutti {
 namespace {
 
@@ -62,7 +64,7 @@ void Calibrate(const std::vector<Ranked>& ranked, LoopEvaluation& result) {
     if (!r.says || !r.calibrated || r.label == LoopLabel::kIgnore) continue;
     const double p = std::clamp(r.score, 0.0, 1.0);
     const int bin = std::max(0, static_cast<int>(std::ceil(p * kBins)) - 1);
-    ReliabilityBin& b = result.reliability[static_cast<std::size_t>(bin)];
+    ReliabilityBin& b = result.reliability[internal::Index(bin)];
     ++b.images;
     b.mean_probability += p;
     b.accuracy += r.label == LoopLabel::kLoop ? 1 : 0;
@@ -116,7 +118,7 @@ void CountPart(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth, 
   for (std::size_t i = 0; i < ranked.size(); ++i) {
     const int image = ranked[i].image;
     if (image < 0 || image >= truth.size() || !truth.HasLoop(image)) continue;
-    if (!belongs(truth.best_views[static_cast<std::size_t>(image)])) continue;
+    if (!belongs(truth.best_views[internal::Index(image)])) continue;
     const std::vector<int>& found = result.found_at_100_precision;
     ++part.rows;
     part.found += result.outcomes[i] == LoopOutcome::kTruePositive ? 1 : 0;
@@ -156,7 +158,7 @@ LoopEvaluation Evaluate(const std::vector<Ranked>& ranked, const LoopGroundTruth
   return result;
 }
 
-// Of the accepted images, which rank first, and of the others, if they are ranked at all.
+// The accepted images rank first, and then the others, if they are ranked at all.
 LoopEvaluation EvaluateDecisions(const std::vector<LoopObservation>& observations,
                                  const LoopGroundTruth& truth, bool with_rejected) {
   std::vector<Ranked> ranked;

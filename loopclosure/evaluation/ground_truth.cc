@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/angle.h"
+#include "core/index.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -76,7 +77,7 @@ LoopGroundTruth ReadText(const std::filesystem::path& file, int num_images) {
                        std::to_string(rows.front().size()));
     }
     rows.push_back(std::move(row));
-    if (rows.size() > static_cast<std::size_t>(kMaxImages) * 100)
+    if (rows.size() > internal::Index(kMaxImages) * 100)
       throw InputError(where + ": too many lines for a loop matrix");
   }
   if (rows.empty()) throw InputError(file.string() + ": holds no labels");
@@ -108,19 +109,16 @@ LoopGroundTruth ReadText(const std::filesystem::path& file, int num_images) {
 }  // namespace
 
 LoopGroundTruth::LoopGroundTruth(int size)
-    : size_(size),
-      labels_(static_cast<std::size_t>(size) * static_cast<std::size_t>(size), LoopLabel::kNone) {}
+    : size_(size), labels_(internal::Index(size) * internal::Index(size), LoopLabel::kNone) {}
 
 LoopLabel LoopGroundTruth::At(int row, int column) const {
   if (row < 0 || row >= size_ || column < 0 || column >= row) return LoopLabel::kNone;
-  return labels_[static_cast<std::size_t>(row) * static_cast<std::size_t>(size_) +
-                 static_cast<std::size_t>(column)];
+  return labels_[internal::Index(row) * internal::Index(size_) + internal::Index(column)];
 }
 
 void LoopGroundTruth::Set(int row, int column, LoopLabel label) {
   if (row < 0 || row >= size_ || column < 0 || column >= row) return;
-  labels_[static_cast<std::size_t>(row) * static_cast<std::size_t>(size_) +
-          static_cast<std::size_t>(column)] = label;
+  labels_[internal::Index(row) * internal::Index(size_) + internal::Index(column)] = label;
 }
 
 bool LoopGroundTruth::HasLoop(int row) const {
@@ -150,7 +148,7 @@ LoopGroundTruth LoopGroundTruth::First(int size) const {
   result.description = description;
   result.least_overlap = least_overlap;
   result.best_views = best_views;
-  if (!best_views.empty()) result.best_views.resize(static_cast<std::size_t>(result.size_));
+  if (!best_views.empty()) result.best_views.resize(internal::Index(result.size_));
   for (int r = 0; r < result.size_; ++r) {
     for (int c = 0; c < r; ++c) result.Set(r, c, At(r, c));
   }
@@ -180,14 +178,14 @@ std::string LoopRule::Validate() const {
 }
 
 LoopGroundTruth LoopsFromMatrix(const std::vector<double>& values, int size) {
-  if (size < 0 || values.size() != static_cast<std::size_t>(size) * static_cast<std::size_t>(size)) {
+  if (size < 0 || values.size() != internal::Index(size) * internal::Index(size)) {
     throw InputError("a loop matrix of " + std::to_string(size) + " images can't have " +
                      std::to_string(values.size()) + " labels");
   }
   bool lower_used = false;
   bool upper_used = false;
   const auto at = [&](int r, int c) {
-    return values[static_cast<std::size_t>(r) * static_cast<std::size_t>(size) + static_cast<std::size_t>(c)];
+    return values[internal::Index(r) * internal::Index(size) + internal::Index(c)];
   };
   for (int r = 0; r < size; ++r) {
     for (int c = 0; c < size; ++c) {
@@ -231,9 +229,9 @@ LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule
   LoopGroundTruth truth(static_cast<int>(trajectory.size()));
   const bool rotations = HasRotations(trajectory);
   for (int r = 0; r < truth.size(); ++r) {
-    const StampedPose& current = trajectory[static_cast<std::size_t>(r)];
+    const StampedPose& current = trajectory[internal::Index(r)];
     for (int c = 0; c < r; ++c) {
-      const StampedPose& past = trajectory[static_cast<std::size_t>(c)];
+      const StampedPose& past = trajectory[internal::Index(c)];
       const double distance = (current.pose.translation - past.pose.translation).norm();
       if (current.stamp_s - past.stamp_s < rule.exclude_s - 1e-6) {
         truth.Set(r, c, LoopLabel::kIgnore);

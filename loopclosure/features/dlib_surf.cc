@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/index.h"
 #include "loopclosure/features/scratch_pool.h"
 #include "loopclosure/features/surf_hessian.h"
-#include "loopclosure/features/surf_integral.h"
-#include "loopclosure/store/signed_squares.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tutti/loopclosure/features.h"
 
 extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,
@@ -84,13 +84,13 @@ void AddByAngle(const dlib::vector<double, 2>& sample, SliceSums& sums) {
     const double end = begin + kWidth;
     const bool inside = begin <= angle && angle <= end;
     if (inside || (end > kPi && (angle >= begin || angle <= -2 * kPi + end))) {
-      sums[static_cast<std::size_t>(slice)] += sample;
+      sums[internal::Index(slice)] += sample;
     }
   }
 }
 
-// The same. Slices begin and end at whole sectors, two to a step: only a sample next to a sector's border
-// needs its angle exactly.
+// Does what AddByAngle does. Slices begin and end at whole sectors, two to a step: only a sample next to a
+// sector's border needs its angle exactly.
 void AddBySector(const dlib::vector<double, 2>& sample, SliceSums& sums) {
   constexpr int kSectors = 2 * kSlices;
   constexpr int kSectorsOfSlice = 15;
@@ -106,11 +106,11 @@ void AddBySector(const dlib::vector<double, 2>& sample, SliceSums& sums) {
   }
   const int last = sector / 2;
   for (int s = last - (kSectorsOfSlice - 1) / 2 + sector % 2; s <= last; ++s) {
-    sums[static_cast<std::size_t>(s < 0 ? s + kSlices : s)] += sample;
+    sums[internal::Index(s < 0 ? s + kSlices : s)] += sample;
   }
 }
 
-// As dlib::compute_dominant_angle, sum for sum.
+// Equals dlib::compute_dominant_angle, sum for sum.
 double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centre, double scale) {
   constexpr int kRadius = 6;
   SliceSums sums;
@@ -133,9 +133,9 @@ double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centr
   return std::atan2(best.y(), best.x());
 }
 
-// As dlib::compute_surf_descriptor, sum for sum; but its 4 x 4 cells overlap, and each of the 20 x 20 samples
-// is taken from the image and turned once. Values are rounded such that they fit a byte, as SIFT's do: a
-// saved map is a fifth smaller.
+// Equals dlib::compute_surf_descriptor, sum for sum; but its 4 x 4 cells overlap, and each of the 20 x 20
+// samples is taken from the image and turned once. Values are rounded such that they fit a byte, as SIFT's
+// do: a saved map is a fifth smaller.
 void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre, double scale, double angle,
                     float* descriptor) {
   constexpr int kSide = 20, kHalf = kSide / 2;
@@ -160,9 +160,8 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
       for (int y = std::max(0, r - 1); y < std::min(kSide, r + kCell + 1); ++y) {
         for (int x = std::max(0, c - 1); x < std::min(kSide, c + kCell + 1); ++x) {
           const int away = std::abs(r + 2 - y) + std::abs(c + 2 - x);
-          const double weight = kWeights[static_cast<std::size_t>(away)];
-          const dlib::vector<double, 2>& sample =
-              samples[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
+          const double weight = kWeights[internal::Index(away)];
+          const dlib::vector<double, 2>& sample = samples[internal::Index(y)][internal::Index(x)];
           const double dx = weight * sample.x();
           const double dy = weight * sample.y();
           value[0] += dx;
@@ -187,22 +186,21 @@ class HessianMaxima {
  public:
   explicit HessianMaxima(const internal::SurfHessian& hessian) : hessian_(hessian) {}
 
-  // As dlib::get_interest_points.
+  // Equals dlib::get_interest_points.
   std::vector<dlib::interest_point> Points(double threshold) const {
     std::vector<dlib::interest_point> points;
     for (int o = 0; o < hessian_.octaves(); ++o) {
       for (int i = 1; i < Hessian::kIntervals - 1; ++i) {
         const cv::Mat& layer = Layer(o, i);
         const int margin = Hessian::Border(i + 1) + 1;
-        std::vector<std::uint8_t> found(static_cast<std::size_t>(layer.cols));
+        std::vector<std::uint8_t> found(internal::Index(layer.cols));
         for (int r = margin; r < layer.rows - margin; ++r) {
           internal::FindMaxima(layer.ptr<double>(r), layer.ptr<double>(r - 1), layer.ptr<double>(r + 1),
                                Layer(o, i - 1).ptr<double>(r), Layer(o, i + 1).ptr<double>(r), margin,
                                layer.cols - margin, threshold, found.data());
           for (int c = margin; c < layer.cols - margin; ++c) {
             dlib::interest_point point;
-            if (found[static_cast<std::size_t>(c)] != 0 && IsMaximum(o, i, r, c) &&
-                Interpolate(o, i, r, c, point)) {
+            if (found[internal::Index(c)] != 0 && IsMaximum(o, i, r, c) && Interpolate(o, i, r, c, point)) {
               points.push_back(point);
             }
           }

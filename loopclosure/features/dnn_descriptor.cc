@@ -1,7 +1,5 @@
-#include "loopclosure/features/dnn_descriptor.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -12,12 +10,11 @@
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "loopclosure/features/gradient_descriptor.h"
-#include "loopclosure/features/smallest_image.h"
+#include "core/index.h"
+#include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -126,7 +123,7 @@ bool IsVector(const cv::Mat& values) {
   if (values.dims < 1 || values.total() < 2) return false;
   int longest = 0;
   for (int d = 0; d < values.dims; ++d) longest = std::max(longest, values.size[d]);
-  return static_cast<std::size_t>(longest) == values.total();
+  return internal::Index(longest) == values.total();
 }
 
 // Blue, green, red, 8 bit.
@@ -149,7 +146,7 @@ cv::Mat MakeBlob(const cv::Mat& colour, const DnnOptions& options) {
     cv::Mat plane(colour.rows, colour.cols, CV_32F, blob.ptr<float>(0, c));
     cv::Mat channel;
     cv::extractChannel(colour, channel, options.swap_rb ? 2 - c : c);
-    const auto i = static_cast<std::size_t>(c);
+    const auto i = internal::Index(c);
     const double factor = options.scale / options.stddev[i];
     channel.convertTo(plane, CV_32F, factor, -options.mean[i] * factor);
   }
@@ -212,12 +209,8 @@ DnnDescriptor::DnnDescriptor(const DnnOptions& options) : network_(std::make_sha
 cv::Mat DnnDescriptor::Describe(const cv::Mat& image, const cv::Mat& grey, const cv::Mat& mask) const {
   if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return {};
   const DnnOptions& options = network_->options;
-  cv::Mat seen = InColour(image, grey);
-  if (!mask.empty() && mask.size() == seen.size()) {
-    if (cv::countNonZero(mask) == 0) return {};
-    seen = seen.clone();
-    seen.setTo(cv::mean(seen, mask), mask == 0);
-  }
+  const cv::Mat seen = WithoutMasked(InColour(image, grey), mask);
+  if (seen.empty()) return {};
   const bool smaller = options.width <= seen.cols && options.height <= seen.rows;
   cv::Mat sized;
   cv::resize(seen, sized, cv::Size(options.width, options.height), 0, 0,

@@ -7,10 +7,11 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
-#include "loopclosure/features/dark_image.h"
+#include "core/index.h"
 #include "loopclosure/features/orb.h"
 #include "loopclosure/features/sift.h"
-#include "loopclosure/features/smallest_image.h"
+#include "loopclosure/features/smoothing.h"
+#include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -38,11 +39,11 @@ std::vector<cv::KeyPoint> Picked(const std::vector<cv::KeyPoint>& keypoints,
                                  const std::vector<int>& selected) {
   std::vector<cv::KeyPoint> picked;
   picked.reserve(selected.size());
-  for (const int i : selected) picked.push_back(keypoints[static_cast<std::size_t>(i)]);
+  for (const int i : selected) picked.push_back(keypoints[internal::Index(i)]);
   return picked;
 }
 
-// Of keypoints in order of strength, those that reach the threshold, or as many as are wanted.
+// Keeps, of keypoints in order of strength, those that reach the threshold, or as many as are wanted.
 void DropWeak(double threshold, int wanted, std::vector<cv::KeyPoint>& keypoints) {
   while (static_cast<int>(keypoints.size()) > wanted &&
          static_cast<double>(keypoints.back().response) < threshold) {
@@ -60,23 +61,26 @@ void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
   }
 }
 
-struct Registry {
-  std::mutex mutex;
-  std::vector<std::pair<std::string, FeatureFactory>> types;
-};
+using NamedFactory = std::pair<std::string, FeatureFactory>;
 
-Registry& TheRegistry() {
-  static Registry registry;
-  return registry;
+// What was registered in this process; `added`, if there is one, has joined it.
+std::vector<NamedFactory> Registered(const NamedFactory* added = nullptr) {
+  static std::mutex mutex;
+  static std::vector<NamedFactory> types;
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (added != nullptr) types.push_back(*added);
+  return types;
 }
 
-FeatureFactory Registered(const std::string& name) {
-  Registry& registry = TheRegistry();
-  const std::lock_guard<std::mutex> lock(registry.mutex);
-  for (const auto& [known, factory] : registry.types) {
-    if (known == name) return factory;
-  }
-  throw InputError("unknown member '" + name + "'");
+// Factories of all members but surf, sift and orb; null for those and for an unknown name.
+FeatureFactory FactoryOf(const std::string& name) {
+  std::vector<NamedFactory> types = {{"akaze", [](cv::Size, int) { return cv::AKAZE::create(); }},
+                                     {"brisk", [](cv::Size, int) { return cv::BRISK::create(); }},
+                                     {"kaze", [](cv::Size, int) { return cv::KAZE::create(); }}};
+  for (NamedFactory& type : Registered()) types.push_back(std::move(type));
+  const auto found =
+      std::find_if(types.begin(), types.end(), [&](const NamedFactory& type) { return type.first == name; });
+  return found != types.end() ? found->second : nullptr;
 }
 
 }  // namespace
@@ -87,16 +91,13 @@ void RegisterFeatureType(const std::string& name, FeatureFactory factory) {
     throw InputError("feature type '" + name +
                      "' can't be registered: the name is empty or taken, or there is no factory");
   }
-  Registry& registry = TheRegistry();
-  const std::lock_guard<std::mutex> lock(registry.mutex);
-  registry.types.emplace_back(name, std::move(factory));
+  const NamedFactory added(name, std::move(factory));
+  Registered(&added);
 }
 
-std::vector<std::string> RegisteredFeatureTypes() {
-  Registry& registry = TheRegistry();
-  const std::lock_guard<std::mutex> lock(registry.mutex);
-  std::vector<std::string> names;
-  for (const auto& type : registry.types) names.push_back(type.first);
+std::vector<std::string> KnownFeatureTypes() {
+  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze"};
+  for (const NamedFactory& type : Registered()) names.push_back(type.first);
   return names;
 }
 
@@ -145,7 +146,7 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
   std::vector<int> order(keypoints.size());
   std::iota(order.begin(), order.end(), 0);
   const auto key = [&](int i) {
-    const cv::KeyPoint& k = keypoints[static_cast<std::size_t>(i)];
+    const cv::KeyPoint& k = keypoints[internal::Index(i)];
     return std::make_tuple(-k.response, k.pt.y, k.pt.x, k.size, k.angle, i);
   };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
@@ -156,15 +157,15 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
   const int cells_x = std::max(1, static_cast<int>(std::ceil(image_size.width / cell)));
   const int cells_y = std::max(1, static_cast<int>(std::ceil(image_size.height / cell)));
   const int share = std::max(1, count / (cells_x * cells_y));
-  std::vector<int> taken(static_cast<std::size_t>(cells_x * cells_y), 0);
+  std::vector<int> taken(internal::Index(cells_x * cells_y), 0);
   std::vector<bool> chosen(order.size(), false);
   int num_chosen = 0;
   for (std::size_t i = 0; i < order.size() && num_chosen < count; ++i) {
-    const cv::Point2f& p = keypoints[static_cast<std::size_t>(order[i])].pt;
+    const cv::Point2f& p = keypoints[internal::Index(order[i])].pt;
     const int x = std::clamp(static_cast<int>(p.x / cell), 0, cells_x - 1);
     const int y = std::clamp(static_cast<int>(p.y / cell), 0, cells_y - 1);
     const int at = y * cells_x + x;
-    int& used = taken[static_cast<std::size_t>(at)];
+    int& used = taken[internal::Index(at)];
     if (used >= share) continue;
     ++used;
     chosen[i] = true;
@@ -183,7 +184,10 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 }
 
 FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOptions& options)
-    : name_(name), options_(options), scratches_(std::make_shared<internal::SiftScratchPool>()) {
+    : name_(name),
+      options_(options),
+      factory_(FactoryOf(name)),
+      scratches_(std::make_shared<internal::SiftScratchPool>()) {
   const std::vector<std::string> known = KnownFeatureTypes();
   if (std::find(known.begin(), known.end(), name) == known.end()) {
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
@@ -191,13 +195,6 @@ FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOpti
   if (name == "surf") {
     surf_ = CreateDlibSurf(NumDetected(options), kSurfOctaves, kSurfLeast);
   }
-}
-
-cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
-  if (name_ == "akaze") return cv::AKAZE::create();
-  if (name_ == "brisk") return cv::BRISK::create();
-  if (name_ == "kaze") return cv::KAZE::create();
-  return Registered(name_)(size, NumDetected(options_));
 }
 
 double FeatureExtractor::Shrinking(double pixels) const {
@@ -242,7 +239,8 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
   } else {
     std::vector<cv::KeyPoint> keypoints;
     cv::Mat descriptors;
-    Create(image.size())->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+    factory_(image.size(), NumDetected(options_))
+        ->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
     if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
     const std::vector<int> selected = spread(keypoints);
     features.keypoints = Picked(keypoints, selected);

@@ -1,10 +1,9 @@
-#include "loopclosure/features/gradient_descriptor.h"
+#include "core/index.h"
+#include "loopclosure/features/whole_image.h"
 
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-
-#include "loopclosure/features/smallest_image.h"
 
 namespace tutti {
 namespace {
@@ -20,7 +19,7 @@ using Histograms = std::vector<float>;  // by cell, then by direction
 
 float& At(Histograms& histograms, int row, int column, int bin) {
   const int at = (row * kColumns + column) * kBins + bin;
-  return histograms[static_cast<std::size_t>(at)];
+  return histograms[internal::Index(at)];
 }
 
 // A pixel's gradient goes into the two next directions and the four next cells, each by its nearness.
@@ -66,6 +65,14 @@ Histograms Relative(Histograms histograms) {
 
 }  // namespace
 
+cv::Mat WithoutMasked(const cv::Mat& image, const cv::Mat& mask) {
+  if (mask.empty() || mask.size() != image.size()) return image;
+  if (cv::countNonZero(mask) == 0) return {};
+  cv::Mat seen = image.clone();
+  seen.setTo(cv::mean(image, mask), mask == 0);
+  return seen;
+}
+
 cv::Mat NormalisedDescriptor(const cv::Mat& descriptor) {
   if (descriptor.empty()) return {};
   const double length = cv::norm(descriptor);
@@ -75,12 +82,8 @@ cv::Mat NormalisedDescriptor(const cv::Mat& descriptor) {
 
 cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask) {
   if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return {};
-  cv::Mat seen = grey;
-  if (!mask.empty() && mask.size() == grey.size()) {
-    if (cv::countNonZero(mask) == 0) return {};
-    seen = grey.clone();
-    seen.setTo(cv::mean(grey, mask), mask == 0);
-  }
+  const cv::Mat seen = WithoutMasked(grey, mask);
+  if (seen.empty()) return {};
   cv::Mat small;
   cv::resize(seen, small, cv::Size(kWidth, kHeight), 0, 0, cv::INTER_AREA);
   small.convertTo(small, CV_32F);
@@ -90,7 +93,7 @@ cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask) {
   cv::Mat dx, dy;
   cv::Sobel(small, dx, CV_32F, 1, 0, 1);
   cv::Sobel(small, dy, CV_32F, 0, 1, 1);
-  Histograms histograms(static_cast<std::size_t>(kColumns * kRows * kBins), 0.0f);
+  Histograms histograms(internal::Index(kColumns * kRows * kBins), 0.0f);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       const float gx = dx.at<float>(y, x), gy = dy.at<float>(y, x);

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "core/fast_corners.h"
+#include "core/index.h"
 #include "core/intensity_centroid.h"
 #include "core/orb_description.h"
 
@@ -50,7 +51,7 @@ const IntensityCentroid& OrbPatch() {
   static const IntensityCentroid patch = [] {
     constexpr int kRadius = IntensityCentroid::kRadius;
     IntensityCentroid::HalfWidths widths{};
-    const auto width = [&widths](int v) -> int& { return widths[static_cast<std::size_t>(v)]; };
+    const auto width = [&widths](int v) -> int& { return widths[Index(v)]; };
     const int diagonal = cvCeil(kRadius / std::sqrt(2.0));
     for (int v = 0; v < diagonal; ++v) width(v) = cvRound(std::sqrt(double(kRadius * kRadius - v * v)));
     for (int v = diagonal; v <= kRadius; ++v) {
@@ -76,7 +77,7 @@ float HarrisResponse(const cv::Mat& padded, int x, int y) {
     const cv::v_int16x8 left = cv::v_reinterpret_as_s16(cv::v_load_expand(row - 1));
     const cv::v_int16x8 here = cv::v_reinterpret_as_s16(cv::v_load_expand(row));
     const cv::v_int16x8 right = cv::v_reinterpret_as_s16(cv::v_load_expand(row + 1));
-    const auto at = static_cast<std::size_t>(r);
+    const auto at = Index(r);
     slope[at] = (right - left) & inside;
     sum[at] = (left + here + here + right) & inside;
   }
@@ -124,7 +125,7 @@ Orb::Orb(const cv::Mat& image, const OrbOptions& options) : options_(options) {
   for (int l = 0; l < options.levels; ++l) {
     Level level;
     level.scale = ScaleOf(l);
-    level.wanted = wanted[static_cast<std::size_t>(l)];
+    level.wanted = wanted[Index(l)];
     cv::Mat resized = image;
     if (l > 0) {
       const float inverse = 1.0f / level.scale;

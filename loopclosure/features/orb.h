@@ -22,7 +22,7 @@ OrbOptions OrbOptionsFor(cv::Size size, int features);
 /// it computes them where the processor has FMA (OrbDescription).
 class Orb {
  public:
-  /// Of an 8-bit grey image that is not empty.
+  /// `image`: 8-bit grey, not empty.
   Orb(const cv::Mat& image, const OrbOptions& options);
 
   /// What cv::ORB::detect finds, in its order, but without angles (-1): level by level, on each the points

@@ -20,7 +20,6 @@ class ScratchPool {
     free_.pop_back();
     return scratch;
   }
-  /// Gives it back.
   void Give(std::unique_ptr<Scratch> scratch) {
     const std::lock_guard<std::mutex> lock(mutex_);
     free_.push_back(std::move(scratch));

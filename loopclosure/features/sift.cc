@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/clones.h"
+#include "core/index.h"
 #include "core/sanitized_range.h"
-#include "loopclosure/features/gaussian_blur.h"
-#include "loopclosure/features/sift_descriptor.h"
+#include "loopclosure/features/smoothing.h"
 
 namespace tutti::internal {
 namespace {
@@ -38,7 +38,7 @@ void Build(const cv::Mat& image, double blur, SiftScratch& scratch) {
   const int side = std::min(image.rows, image.cols);
   const int octaves = std::max(1, cvRound(std::log2(static_cast<double>(side))) - 2);
   std::vector<Octave>& pyramid = scratch.pyramid;
-  pyramid.resize(static_cast<std::size_t>(octaves));
+  pyramid.resize(Index(octaves));
   const double step = std::pow(2.0, 1.0 / kLayers);
   for (std::size_t o = 0; o < pyramid.size(); ++o) {
     if (o == 0) {
@@ -63,7 +63,7 @@ struct Line {
 };
 
 Line Difference(const Octave& octave, int layer, int row, int col) {
-  const auto i = static_cast<std::size_t>(layer);
+  const auto i = Index(layer);
   return {octave[i].ptr<float>(row) + col, octave[i + 1].ptr<float>(row) + col};
 }
 
@@ -129,15 +129,15 @@ bool Refine(const Octave& octave, int layer, int row, int col, float least, Poin
   return true;
 }
 
-// As std::max and std::min, which sanitizers would not let be inlined below.
+// These are std::max and std::min, which sanitizers would not let be inlined below.
 TUTTI_CHECKED_AS_A_WHOLE inline float Larger(float a, float b) { return a < b ? b : a; }
 TUTTI_CHECKED_AS_A_WHOLE inline float Smaller(float a, float b) { return b < a ? b : a; }
 
 TUTTI_CHECKED_AS_A_WHOLE void WriteOut(const Line& line, int cols, float* to) {
   const float *fine = line.fine, *coarse = line.coarse;
-  CheckReadable(fine, static_cast<std::size_t>(cols));
-  CheckReadable(coarse, static_cast<std::size_t>(cols));
-  CheckWritable(to, static_cast<std::size_t>(cols));
+  CheckReadable(fine, Index(cols));
+  CheckReadable(coarse, Index(cols));
+  CheckWritable(to, Index(cols));
   for (int c = 0; c < cols; ++c) to[c] = coarse[c] - fine[c];
 }
 
@@ -145,8 +145,8 @@ TUTTI_CHECKED_AS_A_WHOLE void WriteOut(const Line& line, int cols, float* to) {
 TUTTI_CLONES("avx2")
 TUTTI_CHECKED_AS_A_WHOLE void Candidates(const float* h, const float* u, const float* d, const float* b,
                                          const float* a, int cols, float least, std::uint8_t* found) {
-  for (const float* line : {h, u, d, b, a}) CheckReadable(line, static_cast<std::size_t>(cols));
-  CheckWritable(found, static_cast<std::size_t>(cols));
+  for (const float* line : {h, u, d, b, a}) CheckReadable(line, Index(cols));
+  CheckWritable(found, Index(cols));
   for (int c = kBorder; c < cols - kBorder; ++c) {
     const float high =
         Larger(Larger(Larger(h[c - 1], h[c + 1]), Larger(u[c], d[c])), Larger(Larger(a[c], b[c]), least));
@@ -173,7 +173,7 @@ std::vector<Point> Detect(SiftScratch& scratch, float least) {
     const int rows = octave[0].rows;
     const int cols = octave[0].cols;
     if (std::min(rows, cols) <= 2 * kBorder) break;
-    scratch.found.assign(static_cast<std::size_t>(cols), 0);
+    scratch.found.assign(Index(cols), 0);
     // Three lines of each difference, in turns: they stay in the cache.
     scratch.lines.create(3 * (kBlurs - 1), cols, CV_32F);
     const auto line = [&](int layer, int row) { return scratch.lines.ptr<float>(3 * layer + row % 3); };
@@ -219,7 +219,7 @@ Features ExtractSift(const cv::Mat& image, double blur, const SiftOptions& optio
   std::vector<Point> points = Detect(scratch, std::min(wanted, grey_levels(options.least_contrast)));
   std::stable_sort(points.begin(), points.end(),
                    [](const Point& a, const Point& b) { return a.response > b.response; });
-  const auto most = static_cast<std::size_t>(options.features);
+  const auto most = Index(options.features);
   while (points.size() > most && points.back().response < wanted) points.pop_back();
   points.resize(std::min(points.size(), 2 * most));
 
@@ -229,9 +229,8 @@ Features ExtractSift(const cv::Mat& image, double blur, const SiftOptions& optio
   Features features;
   features.descriptors.create(options.features, static_cast<int>(kSiftValues), CV_32F);
   for (const int i : SelectSpread(places, image.size(), options.features)) {
-    Point point = points[static_cast<std::size_t>(i)];
-    const cv::Mat& described =
-        pyramid[static_cast<std::size_t>(point.octave)][static_cast<std::size_t>(point.layer)];
+    Point point = points[Index(i)];
+    const cv::Mat& described = pyramid[Index(point.octave)][Index(point.layer)];
     for (const float angle : SiftOrientations(described, point.at, point.scale)) {
       if (features.keypoints.size() == most) break;
       point.angle_deg = 360.0f - angle;

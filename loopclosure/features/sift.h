@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -10,6 +11,16 @@
 #include "tutti/loopclosure/features.h"
 
 namespace tutti::internal {
+
+constexpr std::size_t kSiftValues = 128;  ///< of a descriptor
+
+/// Directions of the gradient that stand out around a point of an octave's image (CV_32F) [deg,
+/// counter-clockwise]. `at` and `scale` in its pixels.
+std::vector<float> SiftOrientations(const cv::Mat& image, const cv::Point2f& at, float scale);
+
+/// The 128 values of a point's descriptor, whole numbers; `angle_deg` as cv::KeyPoint has it.
+void DescribeSift(const cv::Mat& image, const cv::Point2f& at, float scale, float angle_deg,
+                  float* descriptor);
 
 /// Memory of one extraction, to be used again: fresh pages cost more than the work that fills them.
 struct SiftScratch {

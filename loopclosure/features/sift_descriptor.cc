@@ -1,4 +1,5 @@
-#include "loopclosure/features/sift_descriptor.h"
+#include "core/index.h"
+#include "loopclosure/features/sift.h"
 
 #include <algorithm>
 #include <array>
@@ -41,7 +42,7 @@ const std::array<Sample, kSamples>& Samples() {
     for (int r = 0; r < kGrid; ++r) {
       for (int c = 0; c < kGrid; ++c) {
         const int at = r * kGrid + c;
-        Sample& sample = grid[static_cast<std::size_t>(at)];
+        Sample& sample = grid[Index(at)];
         sample.x = first + static_cast<float>(c) * spacing;
         sample.y = first + static_cast<float>(r) * spacing;
         const float cell_x = sample.x + 0.5f * kCells + 0.5f;  // of the padded histogram
@@ -68,14 +69,14 @@ std::vector<float> SiftOrientations(const cv::Mat& image, const cv::Point2f& at,
   const int radius = cvRound(3.0f * kAngleSigma * scale);
   const float sigma = kAngleSigma * scale;
   const cv::Point centre(cvRound(at.x), cvRound(at.y));
-  std::vector<float> falloff(static_cast<std::size_t>(radius + 1));
+  std::vector<float> falloff(Index(radius + 1));
   for (int i = 0; i <= radius; ++i) {
-    falloff[static_cast<std::size_t>(i)] = std::exp(-static_cast<float>(i * i) / (2 * sigma * sigma));
+    falloff[Index(i)] = std::exp(-static_cast<float>(i * i) / (2 * sigma * sigma));
   }
   const int left = std::max(1, centre.x - radius);
   const int right = std::min(image.cols - 2, centre.x + radius);
   const int width = std::max(0, right - left + 1);
-  const auto columns = static_cast<std::size_t>(width);
+  const auto columns = Index(width);
   std::vector<float> dx(RoomForPolar(columns));
   std::vector<float> dy(dx.size());
   std::vector<float> length(dx.size());
@@ -90,26 +91,25 @@ std::vector<float> SiftOrientations(const cv::Mat& image, const cv::Point2f& at,
       dy[i] = u[i] - d[i];
     }
     Polar(dx.data(), dy.data(), columns, length.data(), angle.data());
-    const float row_weight = falloff[static_cast<std::size_t>(std::abs(y - centre.y))];
+    const float row_weight = falloff[Index(std::abs(y - centre.y))];
     for (int i = 0; i < width; ++i) {
-      const auto k = static_cast<std::size_t>(i);
+      const auto k = Index(i);
       const int bin = cvRound(angle[k] * (kAngleBins / 360.0f)) % kAngleBins;
-      bins[static_cast<std::size_t>(bin)] +=
-          length[k] * row_weight * falloff[static_cast<std::size_t>(std::abs(left + i - centre.x))];
+      bins[Index(bin)] += length[k] * row_weight * falloff[Index(std::abs(left + i - centre.x))];
     }
   }
   std::array<float, kAngleBins> smooth{};
-  const auto bin = [&](int i) { return bins[static_cast<std::size_t>((i + kAngleBins) % kAngleBins)]; };
+  const auto bin = [&](int i) { return bins[Index((i + kAngleBins) % kAngleBins)]; };
   for (int i = 0; i < kAngleBins; ++i) {
-    smooth[static_cast<std::size_t>(i)] = (bin(i - 2) + bin(i + 2)) * (1.0f / 16) +
-                                          (bin(i - 1) + bin(i + 1)) * (4.0f / 16) + bin(i) * (6.0f / 16);
+    smooth[Index(i)] = (bin(i - 2) + bin(i + 2)) * (1.0f / 16) + (bin(i - 1) + bin(i + 1)) * (4.0f / 16) +
+                       bin(i) * (6.0f / 16);
   }
   const float least = kAnglePeak * *std::max_element(smooth.begin(), smooth.end());
   std::vector<float> angles;
   for (int i = 0; i < kAngleBins; ++i) {
-    const float here = smooth[static_cast<std::size_t>(i)];
-    const float before = smooth[static_cast<std::size_t>((i + kAngleBins - 1) % kAngleBins)];
-    const float after = smooth[static_cast<std::size_t>((i + 1) % kAngleBins)];
+    const float here = smooth[Index(i)];
+    const float before = smooth[Index((i + kAngleBins - 1) % kAngleBins)];
+    const float after = smooth[Index((i + 1) % kAngleBins)];
     if (here <= before || here <= after || here < least) continue;
     const float top = static_cast<float>(i) + 0.5f * (before - after) / (before - 2 * here + after);
     angles.push_back(top * (360.0f / kAngleBins));

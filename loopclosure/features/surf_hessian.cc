@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "core/clones.h"
+#include "core/index.h"
 #include "core/sanitized_range.h"
 
 namespace tutti::internal {
@@ -15,9 +16,9 @@ using Sum = std::int32_t;
 // Where a row of sums is read: at `offset` pixels from each of the places of a layer.
 class Reader {
  public:
-  // Of sums as they lie in memory.
+  // Reads sums as they lie in memory.
   Reader(int first, int step) : first_(first), step_(step) {}
-  // Of sums that are split into `odd` of even columns and those of odd ones: each second place then lies
+  // Reads sums that are split into `odd` of even columns and those of odd ones: each second place then lies
   // beside the one before.
   static Reader OfSplit(int first, int odd) {
     Reader reader(first, 1);
@@ -50,7 +51,7 @@ Corners Box(const Reader& at, const Sum* above, const Sum* below, int left, int 
 void CheckBox(const Corners& box, int step, int count) {
   if (count <= 0) return;
   for (const Sum* corner : {box.above_left, box.above_right, box.below_left, box.below_right})
-    CheckReadable(corner, static_cast<std::size_t>(count - 1) * static_cast<std::size_t>(step) + 1);
+    CheckReadable(corner, Index(count - 1) * Index(step) + 1);
 }
 
 TUTTI_CHECKED_AS_A_WHOLE inline Sum Inside(const Corners& box, int i) {
@@ -63,7 +64,7 @@ TUTTI_CHECKED_AS_A_WHOLE void SecondDerivative(const Corners& outer, const Corne
                                                int count, Sum* out) {
   CheckBox(outer, step, count);
   CheckBox(inner, step, count);
-  CheckWritable(out, static_cast<std::size_t>(count));
+  CheckWritable(out, Index(count));
   const Corners o = outer;
   const Corners n = inner;
   if (step == 1) {
@@ -80,7 +81,7 @@ TUTTI_CHECKED_AS_A_WHOLE void MixedDerivative(const Corners& above_right, const 
                                               int count, Sum* out) {
   for (const Corners* box : {&above_right, &below_left, &above_left, &below_right})
     CheckBox(*box, step, count);
-  CheckWritable(out, static_cast<std::size_t>(count));
+  CheckWritable(out, Index(count));
   const Corners a = above_right;
   const Corners b = below_left;
   const Corners c = above_left;
@@ -126,7 +127,7 @@ void Split(const SurfIntegral& image, cv::Mat& split) {
 
 void SurfHessian::Compute(const SurfIntegral& image, int octaves) {
   octaves_ = octaves;
-  layers_.resize(static_cast<std::size_t>(octaves) * kIntervals);
+  layers_.resize(Index(octaves) * kIntervals);
   const auto columns = static_cast<std::size_t>(image.nc());
   xx_.resize(columns);
   yy_.resize(columns);
@@ -165,8 +166,7 @@ void SurfHessian::Fill(const SurfIntegral& image, int octave, int interval) {
   const double area = 1.0 / ((3.0 * lobe) * (3.0 * lobe));
   const int rows = static_cast<int>(image.nr());
   const int cols = static_cast<int>(image.nc());
-  cv::Mat& layer =
-      layers_[static_cast<std::size_t>(octave) * kIntervals + static_cast<std::size_t>(interval)];
+  cv::Mat& layer = layers_[Index(octave) * kIntervals + Index(interval)];
   layer.create(rows / step, cols / step, CV_64F);
   // Places x = border, border + step, ... < cols - border that the layer has.
   const int past = std::min((cols - border + step - 1) / step, layer.cols);
@@ -200,7 +200,7 @@ TUTTI_CHECKED_AS_A_WHOLE void FindMaxima(const double* h, const double* u, const
                                          const double* finer, const double* coarser, int begin, int past,
                                          double least, std::uint8_t* found) {
   if (past <= begin) return;
-  const auto count = static_cast<std::size_t>(past - begin);
+  const auto count = Index(past - begin);
   CheckReadable(h + begin - 1, count + 2);
   for (const double* line : {u, d, finer, coarser}) CheckReadable(line + begin, count);
   CheckWritable(found + begin, count);

@@ -5,7 +5,9 @@
 #include <cstring>
 
 #include "core/clones.h"
+#include "core/index.h"
 #include "core/sanitized_range.h"
+#include "loopclosure/features/distances.h"
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #include <immintrin.h>
@@ -49,8 +51,8 @@ TUTTI_CHECKED_AS_A_WHOLE void MultiplyAnywhere(const Task& t) {
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define TUTTI_BY_AVX2 __attribute__((target("avx2"))) TUTTI_CHECKED_AS_A_WHOLE
-// The same numbers. What target_clones would have to find by itself: one instruction multiplies two pairs and
-// adds them up.
+// It gives the numbers of MultiplyAnywhere. What target_clones would have to find by itself: one instruction
+// multiplies two pairs and adds them up.
 TUTTI_BY_AVX2 void MultiplyByAvx2(const Task& t) {
   static_assert(kTogether == 4 && kRowBlock == 16);
   for (std::size_t c = 0; c < t.padded; c += kRowBlock) {
@@ -108,12 +110,12 @@ void Multiply(const Task& task) {
 std::optional<WholeRows> WholeRows::Of(const cv::Mat& rows, float scale) {
   constexpr std::int64_t kLongest = 1 << 29;  // (a - b)^2 <= 4 max(a^2, b^2)
   WholeRows whole;
-  const auto count = static_cast<std::size_t>(rows.rows), width = static_cast<std::size_t>(rows.cols);
+  const auto count = Index(rows.rows), width = Index(rows.cols);
   whole.pairs_ = static_cast<int>((width + 1) / 2);
-  whole.values_.resize((count + kTogether - 1) * 2 * static_cast<std::size_t>(whole.pairs_));
+  whole.values_.resize((count + kTogether - 1) * 2 * Index(whole.pairs_));
   for (std::size_t r = 0; r < count; ++r) {
     const float* from = rows.ptr<float>(static_cast<int>(r));
-    std::int16_t* to = whole.values_.data() + r * 2 * static_cast<std::size_t>(whole.pairs_);
+    std::int16_t* to = whole.values_.data() + r * 2 * Index(whole.pairs_);
     const bool all = Round(from, width, scale, to);
     std::int64_t square = 0;
     for (std::size_t c = 0; c < width; ++c) square += to[c] * to[c];
@@ -125,9 +127,9 @@ std::optional<WholeRows> WholeRows::Of(const cv::Mat& rows, float scale) {
 
 WholeRows::Columns::Columns(const WholeRows& rows)
     : padded_((rows.squares_.size() + kRowBlock - 1) / kRowBlock * kRowBlock),
-      values_(2 * static_cast<std::size_t>(rows.pairs_) * padded_),
+      values_(2 * Index(rows.pairs_) * padded_),
       squares_(rows.squares_) {
-  const auto pairs = static_cast<std::size_t>(rows.pairs_);
+  const auto pairs = Index(rows.pairs_);
   for (std::size_t r = 0; r < squares_.size(); ++r) {
     const std::int16_t* from = rows.values_.data() + r * 2 * pairs;
     for (std::size_t k = 0; k < pairs; ++k) {
@@ -139,7 +141,7 @@ WholeRows::Columns::Columns(const WholeRows& rows)
 }
 
 void WholeRows::Distances(int first, const Columns& others, Block& distances) const {
-  const auto begin = static_cast<std::size_t>(first), pairs = static_cast<std::size_t>(pairs_);
+  const auto begin = Index(first), pairs = Index(pairs_);
   std::vector<std::int32_t> products(kTogether * others.padded_);
   Multiply(
       {values_.data() + begin * 2 * pairs, others.values_.data(), pairs, others.padded_, products.data()});
@@ -153,6 +155,37 @@ void WholeRows::Distances(int first, const Columns& others, Block& distances) co
       to[j] = static_cast<float>(static_cast<std::int32_t>(sum));
     }
   }
+}
+
+RowDistances::RowDistances(const cv::Mat& query, const cv::Mat& candidate)
+    : query_(query), candidate_(candidate) {
+  for (std::vector<float>& distances : distances_) distances.resize(Index(candidate.rows));
+  if (query.type() != CV_32F) return;
+  for (const float scale : {1.0f, WholeRows::kSignedSquares}) {
+    whole_query_ = WholeRows::Of(query, scale);
+    const std::optional<WholeRows> whole = whole_query_ ? WholeRows::Of(candidate, scale) : std::nullopt;
+    if (!whole) continue;
+    columns_.emplace(*whole);
+    scale_ = scale;
+    return;
+  }
+}
+
+const std::vector<float>& RowDistances::To(int i, int count) {
+  if (columns_) {
+    if (i % kTogether == 0) whole_query_->Distances(i, *columns_, distances_);
+    return distances_.at(Index(i % kTogether));
+  }
+  std::vector<float>& distances = distances_.front();
+  if (query_.type() == CV_32F) {
+    SquaredDistances(query_.ptr<float>(i), candidate_.ptr<float>(), count, candidate_.cols,
+                     candidate_.step1(), distances.data());
+    return distances;
+  }
+  HammingDistances(query_.ptr(i), candidate_.ptr(), count, candidate_.cols, candidate_.step[0],
+                   distances.data());
+  for (float& distance : distances) distance *= distance;
+  return distances;
 }
 
 }  // namespace tutti::internal

@@ -11,8 +11,7 @@
 namespace tutti::internal {
 
 /// Descriptors as whole numbers of 16 bits: SIFT's values are such, SURF's are, times 128^2
-/// (store/signed_squares.h). Their scalar products are exact, in any order, and so are the same on every
-/// machine.
+/// (store/packed_mat.h). Their scalar products are exact, in any order, and so are the same on every machine.
 class WholeRows {
  public:
   /// Makes whole numbers of signed squares.
@@ -22,14 +21,10 @@ class WholeRows {
   /// fit 32 bits.
   static std::optional<WholeRows> Of(const cv::Mat& rows, float scale);
 
-  int rows() const { return static_cast<int>(squares_.size()); }
-  int cols() const { return 2 * pairs_; }
-
-  /// The same rows for the other side of Distances.
+  /// Rows as the other side of Distances needs them.
   class Columns {
    public:
     explicit Columns(const WholeRows& rows);
-    int rows() const { return static_cast<int>(squares_.size()); }
 
    private:
     friend class WholeRows;
@@ -49,6 +44,25 @@ class WholeRows {
   int pairs_ = 0;                     // of values, of each row
   std::vector<std::int16_t> values_;  // row by row, and zeros for kTogether - 1 rows more
   std::vector<std::int32_t> squares_;
+};
+
+/// Squared distances of the rows of one matrix to those of another of the same type, CV_32F (Euclidean) or
+/// CV_8U (Hamming), in units of scale()^-2. Both must outlive this object.
+class RowDistances {
+ public:
+  RowDistances(const cv::Mat& query, const cv::Mat& candidate);
+
+  /// From row i to the first `count` candidates at least; for i = 0, 1, 2, ... in this order.
+  const std::vector<float>& To(int i, int count);
+  float scale() const { return scale_; }
+
+ private:
+  const cv::Mat& query_;
+  const cv::Mat& candidate_;
+  float scale_ = 1.0f;
+  std::optional<WholeRows> whole_query_;
+  std::optional<WholeRows::Columns> columns_;  // of the candidates, if they are whole numbers, too
+  WholeRows::Block distances_;
 };
 
 }  // namespace tutti::internal

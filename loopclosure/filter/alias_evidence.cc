@@ -5,8 +5,8 @@
 #include <iterator>
 #include <numeric>
 
-#include "core/byte_stream.h"
 #include "core/index.h"
+#include "core/state_archive.h"
 
 namespace tutti {
 namespace {
@@ -23,6 +23,8 @@ constexpr double kLongestLasting = 40;     // images that the share of lasting a
 constexpr int kFollows = 2;                // slots from the image before's to the next one's alias
 
 using internal::Index;
+
+bool IsAmount(double value) { return value >= 0 && std::isfinite(value); }
 
 // Largest count of the places, and of those that are not near, each with its slot (-1: no place has any).
 struct Largest {
@@ -136,51 +138,28 @@ void AliasEvidence::LearnLasting(int alias) {
   last_alias_ = alias;
 }
 
-void AliasEvidence::SaveLevel(internal::ByteWriter& out) const {
-  out.Put(log_level_);
-  out.Put(words_sum_);
-  out.Put<std::int32_t>(first_images_);
-  out.Put(images_);
-  out.Put(log_repeated_);
-  out.Put(repeated_images_);
-  out.Put(lasting_);
-  out.Put<std::int32_t>(last_alias_);
+template <class Archive>
+void AliasEvidence::StateOfLevel(Archive& archive) {
+  archive(log_level_, words_sum_, first_images_, images_, log_repeated_, repeated_images_, lasting_,
+          last_alias_);
+  if constexpr (Archive::kReading) {
+    const bool good = log_level_ >= 0 && log_level_ < 50 && IsAmount(words_sum_) && first_images_ >= 0 &&
+                      first_images_ <= kFirstImages && images_ >= 1 && images_ <= kLongestMean &&
+                      std::abs(log_repeated_) < 50 && repeated_images_ >= 0 &&
+                      repeated_images_ <= kLongestMean && lasting_ >= 0 && lasting_ <= 1 && last_alias_ >= -1;
+    if (!good) archive.Damaged("an alias level");
+  }
 }
 
-void AliasEvidence::LoadLevel(internal::ByteReader& in) {
-  log_level_ = in.Get<double>();
-  words_sum_ = in.Get<double>();
-  first_images_ = in.Get<std::int32_t>();
-  images_ = in.Get<double>();
-  log_repeated_ = in.Get<double>();
-  repeated_images_ = in.Get<double>();
-  lasting_ = in.Get<double>();
-  last_alias_ = in.Get<std::int32_t>();
-  const bool good = log_level_ >= 0 && log_level_ < 50 && words_sum_ >= 0 && std::isfinite(words_sum_) &&
-                    first_images_ >= 0 && first_images_ <= kFirstImages && images_ >= 1 &&
-                    images_ <= kLongestMean && std::abs(log_repeated_) < 50 && repeated_images_ >= 0 &&
-                    repeated_images_ <= kLongestMean && lasting_ >= 0 && lasting_ <= 1 && last_alias_ >= -1;
-  if (!good) in.Damaged("an alias level");
-}
-
-void AliasEvidence::Save(internal::ByteWriter& out) const {
-  SaveLevel(out);
-  out.PutVector(sum_);
-  out.PutVector(seen_);
-  out.Put(all_sum_);
-  out.Put(all_seen_);
-}
-
-void AliasEvidence::Load(internal::ByteReader& in) {
-  LoadLevel(in);
-  sum_ = in.GetVector<double>();
-  seen_ = in.GetVector<double>();
-  all_sum_ = in.Get<double>();
-  all_seen_ = in.Get<double>();
-  const auto good = [](double value) { return value >= 0 && std::isfinite(value); };
-  if (sum_.size() != seen_.size() || !std::all_of(sum_.begin(), sum_.end(), good) ||
-      !std::all_of(seen_.begin(), seen_.end(), good) || !good(all_sum_) || !good(all_seen_)) {
-    in.Damaged("counts of places");
+template <class Archive>
+void AliasEvidence::State(Archive& archive) {
+  StateOfLevel(archive);
+  archive(sum_, seen_, all_sum_, all_seen_);
+  if constexpr (Archive::kReading) {
+    if (sum_.size() != seen_.size() || !std::all_of(sum_.begin(), sum_.end(), IsAmount) ||
+        !std::all_of(seen_.begin(), seen_.end(), IsAmount) || !IsAmount(all_sum_) || !IsAmount(all_seen_)) {
+      archive.Damaged("counts of places");
+    }
   }
 }
 
@@ -203,14 +182,12 @@ double MemberWeight::Value() const {
   return (repeated + kLeastRepeated) / (noise + 1.0);
 }
 
-void MemberWeight::Save(internal::ByteWriter& out) const {
-  for (const double value : {repeated_, repeated_images_, false_square_, false_images_}) out.Put(value);
-}
-
-void MemberWeight::Load(internal::ByteReader& in) {
-  for (double* value : {&repeated_, &repeated_images_, &false_square_, &false_images_}) {
-    *value = in.Get<double>();
-    if (!(*value >= 0) || !std::isfinite(*value)) in.Damaged("a member's weight");
+template <class Archive>
+void MemberWeight::State(Archive& archive) {
+  archive(repeated_, repeated_images_, false_square_, false_images_);
+  if constexpr (Archive::kReading) {
+    for (const double value : {repeated_, repeated_images_, false_square_, false_images_})
+      if (!IsAmount(value)) archive.Damaged("a member's weight");
   }
 }
 
@@ -258,21 +235,25 @@ double MemberOverlap::Copies(std::size_t member) const {
   return copies;
 }
 
-void MemberOverlap::Save(internal::ByteWriter& out) const {
-  out.Put<std::int32_t>(static_cast<std::int32_t>(members_));
-  out.PutVector(covariance_);
+template <class Archive>
+void MemberOverlap::State(Archive& archive) {
+  archive(covariance_);
+  if constexpr (Archive::kReading) {
+    members_ = 0;
+    while (members_ * members_ < covariance_.size()) ++members_;
+    if (members_ * members_ != covariance_.size() ||
+        !std::all_of(covariance_.begin(), covariance_.end(), [](double v) { return std::isfinite(v); }))
+      archive.Damaged("what members have in common");
+  }
 }
 
-void MemberOverlap::Load(internal::ByteReader& in) {
-  const std::int32_t members = in.Get<std::int32_t>();
-  covariance_ = in.GetVector<double>();
-  const auto good = [](double value) { return std::isfinite(value); };
-  if (members < 0 || members > 1000 ||
-      covariance_.size() != static_cast<std::size_t>(members) * static_cast<std::size_t>(members) ||
-      !std::all_of(covariance_.begin(), covariance_.end(), good)) {
-    in.Damaged("what members have in common");
-  }
-  members_ = static_cast<std::size_t>(members);
-}
+template void AliasEvidence::StateOfLevel(internal::StateWriter& archive);
+template void AliasEvidence::StateOfLevel(internal::StateReader& archive);
+template void AliasEvidence::State(internal::StateWriter& archive);
+template void AliasEvidence::State(internal::StateReader& archive);
+template void MemberWeight::State(internal::StateWriter& archive);
+template void MemberWeight::State(internal::StateReader& archive);
+template void MemberOverlap::State(internal::StateWriter& archive);
+template void MemberOverlap::State(internal::StateReader& archive);
 
 }  // namespace tutti

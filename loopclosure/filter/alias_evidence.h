@@ -9,11 +9,6 @@
 
 namespace tutti {
 
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
-
 /// Likelihood of the places by their counts of matched words (docs/loop-closure.md section 2).
 ///
 /// The *alias level* Lambda is what the best of the wrong places reaches in this environment. It is learnt
@@ -49,7 +44,7 @@ class AliasEvidence {
   Belief Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory, double words,
                     double repeated, double overlap);
 
-  /// The same for an image by itself, which is no location: nothing is learnt.
+  /// The likelihood of an image by itself, which is no location: nothing is learnt.
   Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory) const;
 
   /// Learns from the same image, after the filter's step: `near` are the slots of the most probable place and
@@ -64,14 +59,11 @@ class AliasEvidence {
   /// s, 0 to 1: how often the best wrong place follows that of the image before.
   double Lasting() const { return lasting_; }
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
-  /// The same for the common level alone, without what is known of single places.
-  void SaveLevel(internal::ByteWriter& out) const;
-  /// Takes up what SaveLevel wrote. Throws InputError if it is damaged.
-  void LoadLevel(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
+  /// The common level alone, without what is known of single places.
+  template <class Archive>
+  void StateOfLevel(Archive& archive);
 
  private:
   // With the levels times `share` and the sharpness times `say`.
@@ -110,10 +102,8 @@ class MemberWeight {
   /// The weight, above 0, of no scale.
   double Value() const;
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   double repeated_ = 0;  // sum of counts for the images before
@@ -139,10 +129,8 @@ class MemberOverlap {
   /// That were seen, 0 before anything is known.
   std::size_t members() const { return members_; }
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   double Correlation(std::size_t a, std::size_t b) const;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/index.h"
+
 namespace tutti {
 
 namespace {
@@ -24,7 +26,7 @@ Belief PowerProduct(const std::vector<const Belief*>& members, const std::vector
   product.new_place = 1.0;
   for (const Belief* member : members) product.new_place *= power(std::max(member->new_place, kFloor));
   for (const int slot : working_memory) {
-    const std::size_t i = static_cast<std::size_t>(slot);
+    const std::size_t i = internal::Index(slot);
     double value = 1.0;
     for (const Belief* member : members) {
       value *= power(std::max(i < member->places.size() ? member->places[i] : 0.0, kFloor));

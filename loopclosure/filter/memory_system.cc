@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/index.h"
 #include "loopclosure/filter/pose_track.h"
 
 namespace tutti::internal {
@@ -11,12 +12,12 @@ namespace {
 constexpr int kNearLevels = 5;  // what is so near to the most probable place may be it
 constexpr int kRepeats = 3;     // images before this one that show what a member repeats
 
-// Of all members that a filter sees, with ids as Signature::Split takes them apart.
+// Words of all members that a filter sees, with ids as Signature::Split takes them apart.
 SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) {
   const int parts = static_cast<int>(unit.members.size());
   SeenWords all;
   for (int p = 0; p < parts; ++p) {
-    const SeenWords& part = words[unit.members[static_cast<std::size_t>(p)]];
+    const SeenWords& part = words[unit.members[Index(p)]];
     for (const int word : part.words) all.words.push_back(word < 0 ? word : word * parts + p);
     all.cells.insert(all.cells.end(), part.cells.begin(), part.cells.end());
     if (unit.is_dense) all.descriptor = part.descriptor;
@@ -101,7 +102,7 @@ void MemorySystem::Repeat(FilterUnit& unit) const {
   double sum = 0;
   int images = 0;
   for (auto slot = recent.rbegin(); slot != recent.rend() && images <= kRepeats; ++slot, ++images) {
-    if (slot != recent.rbegin()) sum += unit.counts[static_cast<std::size_t>(*slot)];
+    if (slot != recent.rbegin()) sum += unit.counts[Index(*slot)];
   }
   if (images < 2) return;
   unit.repeated = sum / (images - 1) * (unit.is_dense ? DenseModel::kRepeatShare : 1.0);
@@ -112,8 +113,8 @@ void MemorySystem::Repeat(FilterUnit& unit) const {
 double MemorySystem::Overlap(const std::vector<double>& counts) const {
   const std::deque<int>& recent = memory_.short_term_memory();
   if (recent.size() < 2) return 0.0;
-  const double own = counts[static_cast<std::size_t>(recent.back())];
-  const double before = counts[static_cast<std::size_t>(recent[recent.size() - 2])];
+  const double own = counts[Index(recent.back())];
+  const double before = counts[Index(recent[recent.size() - 2])];
   return std::min(1.0, before / std::max(1.0, own));
 }
 
@@ -178,7 +179,7 @@ double MemorySystem::WeightOf(std::size_t unit) const { return Weights(PresentCo
 
 std::vector<double> MemorySystem::JointCounts(const UnitCounts& counts,
                                               const std::vector<double>& weights) const {
-  std::vector<double> sum(static_cast<std::size_t>(memory_.size()), 0.0);
+  std::vector<double> sum(Index(memory_.size()), 0.0);
   for (std::size_t u = 0; u < units_.size(); ++u) {
     if (counts[u] == nullptr) continue;
     const std::vector<double>& own = *counts[u];
@@ -206,12 +207,8 @@ void MemorySystem::StepJoint() {
 }
 
 std::vector<int> MemorySystem::NearBest(const PlaceFilter& place_filter) const {
-  std::vector<int> near;
   const int best = place_filter.filter.posterior().Best();
-  if (best < 0) return near;
-  for (const auto& [slot, level, loops] : memory_.Neighbours(best, kNearLevels)) near.push_back(slot);
-  std::sort(near.begin(), near.end());
-  return near;
+  return best < 0 ? std::vector<int>() : memory_.SlotsNear(best, kNearLevels);
 }
 
 void MemorySystem::Learn() {
@@ -293,22 +290,20 @@ void MemorySystem::Link(int a, int b, LocationMemory::LinkType type) {
 
 void MemorySystem::Relinked(int a, int b) {
   // A link to a location outside WM takes effect when that one enters it.
-  const auto in_wm = [this](int slot) { return memory_.state(slot) == LocationMemory::State::kWorking; };
+  const auto in_wm = [this](int slot) { return memory_.state(slot) == LocationState::kWorking; };
   if (in_wm(a) && in_wm(b)) transition_.Update(memory_, {a, b});
 }
 
 void MemorySystem::Reference(const FilterUnit& unit, const Signature& signature) {
-  const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    members_[unit.members[p]].vocabulary().AddReferences(parts[p]);
-  }
+  ForEachPart(unit, signature, [this](std::size_t member, const Signature& part) {
+    members_[member].vocabulary().AddReferences(part);
+  });
 }
 
 void MemorySystem::Release(const FilterUnit& unit, const Signature& signature) {
-  const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    members_[unit.members[p]].vocabulary().RemoveReferences(parts[p]);
-  }
+  ForEachPart(unit, signature, [this](std::size_t member, const Signature& part) {
+    members_[member].vocabulary().RemoveReferences(part);
+  });
 }
 
 }  // namespace tutti::internal

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/filter/alias_evidence.h"
 #include "loopclosure/filter/bayes_filter.h"
 #include "loopclosure/filter/transition_model.h"
@@ -24,7 +24,7 @@ namespace tutti::internal {
 
 /// Records of a memory's nodes under its number, and all of them back again, slots ascending. LoadNodes
 /// throws InputError.
-void StoreNodes(const LocationMemory& memory, int number, const std::set<int>& slots, LocationStore& store);
+void StoreNodes(LocationMemory& memory, int number, const std::set<int>& slots, LocationStore& store);
 void LoadNodes(int number, LocationStore& store, LocationMemory& memory);
 /// Record of a word of a member (its number), which must be in the vocabulary.
 void StoreWord(const Vocabulary& vocabulary, std::size_t member, int word, LocationStore& store);
@@ -40,8 +40,18 @@ struct PlaceFilter {
 
 /// What a unit keeps of a location: its words, or the descriptor of a dense member.
 struct UnitRecord {
+  bool is_dense;
   Signature signature;
   cv::Mat descriptor;
+
+  template <class Archive>
+  void State(Archive& archive) {
+    if (is_dense) {
+      StateOfDescriptor(archive, descriptor);
+    } else {
+      archive(signature);
+    }
+  }
 };
 
 /// A filter and the members whose signatures it sees: one each for most rules; all of them, concatenated, for
@@ -127,11 +137,11 @@ class MemorySystem {
   /// words.
   void Reopen(LocationStore& store);
 
-  void Save(ByteWriter& out) const;
-  void Load(ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
   /// What the evidence knows of the environment, without single places.
-  void SaveLevels(ByteWriter& out) const;
-  void LoadLevels(ByteReader& in);
+  template <class Archive>
+  void StateOfLevels(Archive& archive);
 
   LocationMemory& memory() { return memory_; }
   const LocationMemory& memory() const { return memory_; }
@@ -145,11 +155,18 @@ class MemorySystem {
   const TransitionModel& transition() const { return transition_; }
 
  private:
-  // One record holds what every unit keeps.
+  // One record of a location holds what every unit keeps.
   std::string Record(int slot) const;
   std::vector<UnitRecord> ReadRecord(std::string_view record, const std::string& source) const;
+  void CheckUnit(const FilterUnit& unit, const StateReader& in) const;
   void Restore(int slot, LocationStore& store);
   void ReadWord(std::size_t member, int word, LocationStore& store, cv::Mat& descriptors) const;
+  // Calls call(member, its part of the signature) for each member of a unit.
+  template <typename Call>
+  static void ForEachPart(const FilterUnit& unit, const Signature& signature, const Call& call) {
+    const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
+    for (std::size_t p = 0; p < parts.size(); ++p) call(unit.members[p], parts[p]);
+  }
   void Reference(const FilterUnit& unit, const Signature& signature);
   void Release(const FilterUnit& unit, const Signature& signature);
   bool LooksLikePrevious(int slot) const;
@@ -163,7 +180,6 @@ class MemorySystem {
   UnitCounts PresentCounts() const;
   std::vector<double> Weights(const UnitCounts& counts) const;
   std::vector<double> JointCounts(const UnitCounts& counts, const std::vector<double>& weights) const;
-  void LoadOverlap(ByteReader& in);
   std::vector<int> NearBest(const PlaceFilter& place_filter) const;
 
   int number_;

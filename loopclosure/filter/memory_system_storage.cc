@@ -13,11 +13,12 @@ constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays
 
 }  // namespace
 
-void StoreNodes(const LocationMemory& memory, int number, const std::set<int>& slots, LocationStore& store) {
+void StoreNodes(LocationMemory& memory, int number, const std::set<int>& slots, LocationStore& store) {
   for (const int slot : slots) {
-    ByteWriter record;
-    memory.SaveSlot(slot, record);
-    store.Put(LocationStore::Kind::kNode, number, slot, record.bytes());
+    SharedObjectsOut none;
+    StateWriter out(&none);
+    memory.StateOfSlot(slot, out);
+    store.Put(LocationStore::Kind::kNode, number, slot, out.Take());
   }
 }
 
@@ -25,19 +26,20 @@ void LoadNodes(int number, LocationStore& store, LocationMemory& memory) {
   store.ForEach(LocationStore::Kind::kNode,
                 [&](std::int64_t stored_number, std::int64_t slot, std::string_view bytes) {
                   if (stored_number != number) return;
-                  ByteReader in(bytes, store.name());
+                  SharedObjectsIn none;
+                  StateReader in(bytes, store.name(), &none);
                   if (slot != memory.size()) {
                     in.Damaged("location " + std::to_string(memory.size()) + " is missing");
                   }
-                  memory.LoadSlot(in);
+                  memory.StateOfSlot(memory.size(), in);
+                  in.ExpectEnd();
                 });
   memory.FinishLoading();
 }
 
 void StoreWord(const Vocabulary& vocabulary, std::size_t member, int word, LocationStore& store) {
-  ByteWriter record;
-  PackedMat(vocabulary.Descriptor(word)).Put(record);
-  store.Put(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word, record.bytes());
+  store.Put(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word,
+            StateBytes(PackedMat(vocabulary.Descriptor(word))));
 }
 
 std::vector<int> MemorySystem::Retrieve(int best, LocationStore& store, std::string& warning) {
@@ -59,28 +61,20 @@ std::vector<int> MemorySystem::Retrieve(int best, LocationStore& store, std::str
 
 void MemorySystem::Restore(int slot, LocationStore& store) {
   const auto stored = store.Get(LocationStore::Kind::kSignature, number_, slot);
-  if (!stored) {
-    throw InputError(store.name() + ": is damaged (location " + std::to_string(memory_.id(slot)) +
-                     " is missing); give another file, or an older copy");
-  }
+  if (!stored) store.Damaged("location " + std::to_string(memory_.id(slot)) + " is missing");
   const std::vector<UnitRecord> records = ReadRecord(*stored, store.name());
   // First everything that may fail, then the changes.
   std::vector<std::vector<int>> words(members_.size());
   std::vector<cv::Mat> descriptors(members_.size());
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    const std::vector<Signature> parts =
-        records[u].signature.Split(static_cast<int>(units_[u].members.size()));
-    for (std::size_t p = 0; p < parts.size(); ++p) {
-      const std::size_t k = units_[u].members[p];
-      words[k] = members_[k].vocabulary().Missing(parts[p]);
+    ForEachPart(units_[u], records[u].signature, [&](std::size_t k, const Signature& part) {
+      words[k] = members_[k].vocabulary().Missing(part);
       for (const int word : words[k]) {
-        if (word >= members_[k].vocabulary().created()) {
-          throw InputError(store.name() + ": is damaged (a word that " + members_[k].name() +
-                           " never made); give another file, or an older copy");
-        }
+        if (word >= members_[k].vocabulary().created())
+          store.Damaged("a word that " + members_[k].name() + " never made");
         ReadWord(k, word, store, descriptors[k]);
       }
-    }
+    });
   }
   for (std::size_t k = 0; k < members_.size(); ++k) {
     members_[k].vocabulary().Restore(words[k], descriptors[k]);
@@ -97,14 +91,13 @@ void MemorySystem::ReadWord(std::size_t member, int word, LocationStore& store, 
   const auto record = store.Get(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word);
   cv::Mat row;
   if (record) {
-    ByteReader in(*record, store.name());
-    row = PackedMat::Get(in).Unpacked();
+    PackedMat packed;
+    ReadStateBytes(*record, store.name(), packed);
+    row = packed.Unpacked();
   }
   const bool fits = descriptors.empty() || (row.cols == descriptors.cols && row.type() == descriptors.type());
-  if (row.rows != 1 || !fits || !members_[member].vocabulary().Problem(row).empty()) {
-    throw InputError(store.name() + ": is damaged (word " + std::to_string(word) + " of " +
-                     members_[member].name() + "); give another file, or an older copy");
-  }
+  if (row.rows != 1 || !fits || !members_[member].vocabulary().Problem(row).empty())
+    store.Damaged("word " + std::to_string(word) + " of " + members_[member].name());
   descriptors.push_back(row);
 }
 
@@ -112,7 +105,7 @@ int MemorySystem::NextToTransfer(int best, const std::vector<int>& retrieved) co
   std::set<int> immune(retrieved.begin(), retrieved.end());
   if (best >= 0) {
     immune.insert(best);
-    for (const auto& [slot, level, loops] : memory_.Neighbours(best, kImmuneLevels)) immune.insert(slot);
+    for (const int slot : memory_.SlotsNear(best, kImmuneLevels)) immune.insert(slot);
   }
   return memory_.NextToTransfer(options_.recent_share, immune);
 }
@@ -120,14 +113,10 @@ int MemorySystem::NextToTransfer(int best, const std::vector<int>& retrieved) co
 void MemorySystem::Store(int slot, LocationStore& store) const {
   StoreSignatures(slot, store);
   for (const FilterUnit& unit : units_) {
-    const std::vector<Signature> parts =
-        unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
-    for (std::size_t p = 0; p < parts.size(); ++p) {
-      const std::size_t k = unit.members[p];
-      for (const int word : members_[k].vocabulary().WordsOnlyIn(parts[p])) {
-        StoreWord(members_[k].vocabulary(), k, word, store);
-      }
-    }
+    ForEachPart(unit, unit.likelihood.signature(slot), [&](std::size_t k, const Signature& part) {
+      const Vocabulary& vocabulary = members_[k].vocabulary();
+      for (const int word : vocabulary.WordsOnlyIn(part)) StoreWord(vocabulary, k, word, store);
+    });
   }
 }
 
@@ -164,14 +153,12 @@ void MemorySystem::StoreSignatures(int slot, LocationStore& store) const {
 void MemorySystem::Reopen(LocationStore& store) {
   LoadNodes(number_, store, memory_);
   for (int slot = 0; slot < memory_.size(); ++slot) {
-    const LocationMemory::State state = memory_.state(slot);
     for (FilterUnit& unit : units_) {
       unit.likelihood.Add(Signature());
       unit.likelihood.Remove(slot);
-      if (unit.is_dense) unit.dense.AddAbsent(state == LocationMemory::State::kMerged);
+      if (unit.is_dense) unit.dense.AddAbsent(memory_.state(slot) == LocationState::kMerged);
     }
-    if (state != LocationMemory::State::kShortTerm && state != LocationMemory::State::kWorking) continue;
-    Restore(slot, store);
+    if (memory_.Holds(slot)) Restore(slot, store);
   }
   for (FilterUnit& unit : units_) {
     if (unit.is_dense) unit.dense.FinishLoading();
@@ -180,107 +167,85 @@ void MemorySystem::Reopen(LocationStore& store) {
 }
 
 std::string MemorySystem::Record(int slot) const {
-  ByteWriter out;
+  std::vector<UnitRecord> records;
   for (const FilterUnit& unit : units_) {
-    if (unit.is_dense) {
-      SaveDescriptor(unit.dense.descriptor(slot), out);
-    } else {
-      unit.likelihood.signature(slot).Save(out);
-    }
+    records.push_back({unit.is_dense, unit.likelihood.signature(slot),
+                       unit.is_dense ? unit.dense.descriptor(slot) : cv::Mat()});
   }
-  return out.bytes();
+  SharedObjectsOut none;
+  StateWriter out(&none);
+  for (const UnitRecord& record : records) out(record);
+  return out.Take();
 }
 
 std::vector<UnitRecord> MemorySystem::ReadRecord(std::string_view record, const std::string& source) const {
-  ByteReader in(record, source);
-  std::vector<UnitRecord> records(units_.size());
-  for (std::size_t u = 0; u < units_.size(); ++u) {
-    if (!units_[u].is_dense) {
-      records[u].signature = Signature::Load(in);
-      continue;
-    }
-    records[u].descriptor = LoadDescriptor(in);
-    if (!units_[u].dense.Problem(records[u].descriptor).empty()) in.Damaged("descriptors of several widths");
+  SharedObjectsIn none;
+  StateReader in(record, source, &none);
+  std::vector<UnitRecord> records;
+  for (const FilterUnit& unit : units_) {
+    records.push_back({unit.is_dense, {}, {}});
+    in(records.back());
+    if (unit.is_dense && !unit.dense.Problem(records.back().descriptor).empty())
+      in.Damaged("descriptors of several widths");
   }
+  in.ExpectEnd();
   return records;
 }
 
-void MemorySystem::Save(ByteWriter& out) const {
-  memory_.Save(out);
-  for (const FilterUnit& unit : units_) {
-    unit.likelihood.Save(out);
-    if (unit.is_dense) unit.dense.Save(out);
-    unit.filter.Save(out);
-    unit.alias.Save(out);
-    unit.weight.Save(out);
-  }
-  if (!joint_) return;
-  joint_->filter.Save(out);
-  joint_->alias.Save(out);
-  overlap_.Save(out);
-}
-
-void MemorySystem::LoadOverlap(ByteReader& in) {
-  overlap_.Load(in);
-  if (overlap_.members() != 0 && overlap_.members() != units_.size())
-    in.Damaged("what members have in common");
-}
-
-void MemorySystem::SaveLevels(ByteWriter& out) const {
-  for (const FilterUnit& unit : units_) {
-    unit.alias.SaveLevel(out);
-    unit.weight.Save(out);
-  }
-  if (!joint_) return;
-  joint_->alias.SaveLevel(out);
-  overlap_.Save(out);
-}
-
-void MemorySystem::LoadLevels(ByteReader& in) {
+template <class Archive>
+void MemorySystem::StateOfLevels(Archive& archive) {
   for (FilterUnit& unit : units_) {
-    unit.alias.LoadLevel(in);
-    unit.weight.Load(in);
+    unit.alias.StateOfLevel(archive);
+    archive(unit.weight);
   }
   if (!joint_) return;
-  joint_->alias.LoadLevel(in);
-  LoadOverlap(in);
+  joint_->alias.StateOfLevel(archive);
+  archive(overlap_);
+  if constexpr (Archive::kReading) {
+    if (overlap_.members() != 0 && overlap_.members() != units_.size())
+      archive.Damaged("what members have in common");
+  }
 }
 
-void MemorySystem::Load(ByteReader& in) {
-  memory_.Load(in);
+template <class Archive>
+void MemorySystem::State(Archive& archive) {
+  archive(memory_);
   for (FilterUnit& unit : units_) {
-    unit.likelihood.Load(in);
-    if (unit.is_dense) unit.dense.Load(in);
-    unit.filter.Load(in);
-    unit.alias.Load(in);
-    unit.weight.Load(in);
-    if (unit.likelihood.size() != memory_.size() || (unit.is_dense && unit.dense.size() != memory_.size()) ||
-        static_cast<int>(unit.filter.posterior().places.size()) > memory_.size()) {
-      in.Damaged("locations are missing");
-    }
-    for (int slot = 0; slot < memory_.size(); ++slot) {
-      const LocationMemory::State state = memory_.state(slot);
-      const bool in_memory =
-          state == LocationMemory::State::kShortTerm || state == LocationMemory::State::kWorking;
-      if (unit.likelihood.Has(slot) != in_memory || (unit.is_dense && unit.dense.Has(slot) != in_memory))
-        in.Damaged("locations in memory without their words");
-      const std::vector<Signature> parts =
-          unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
-      for (std::size_t p = 0; p < parts.size(); ++p) {
-        if (!members_[unit.members[p]].vocabulary().Missing(parts[p]).empty())
-          in.Damaged("words are missing");
-      }
-    }
+    archive(unit.likelihood);
+    if (unit.is_dense) archive(unit.dense);
+    archive(unit.filter, unit.alias, unit.weight);
+    if constexpr (Archive::kReading) CheckUnit(unit, archive);
   }
   if (joint_) {
-    joint_->filter.Load(in);
-    joint_->alias.Load(in);
-    LoadOverlap(in);
-    if (static_cast<int>(joint_->filter.posterior().places.size()) > memory_.size()) {
-      in.Damaged("locations are missing");
+    archive(joint_->filter, joint_->alias, overlap_);
+    if constexpr (Archive::kReading) {
+      if (static_cast<int>(joint_->filter.posterior().places.size()) > memory_.size())
+        archive.Damaged("locations are missing");
+      if (overlap_.members() != 0 && overlap_.members() != units_.size())
+        archive.Damaged("what members have in common");
     }
   }
-  transition_.Update(memory_, memory_.working_memory());
+  if constexpr (Archive::kReading) transition_.Update(memory_, memory_.working_memory());
 }
+
+void MemorySystem::CheckUnit(const FilterUnit& unit, const StateReader& in) const {
+  if (unit.likelihood.size() != memory_.size() || (unit.is_dense && unit.dense.size() != memory_.size()) ||
+      static_cast<int>(unit.filter.posterior().places.size()) > memory_.size()) {
+    in.Damaged("locations are missing");
+  }
+  for (int slot = 0; slot < memory_.size(); ++slot) {
+    const bool in_memory = memory_.Holds(slot);
+    if (unit.likelihood.Has(slot) != in_memory || (unit.is_dense && unit.dense.Has(slot) != in_memory))
+      in.Damaged("locations in memory without their words");
+    ForEachPart(unit, unit.likelihood.signature(slot), [&](std::size_t member, const Signature& part) {
+      if (!members_[member].vocabulary().Missing(part).empty()) in.Damaged("words are missing");
+    });
+  }
+}
+
+template void MemorySystem::State(StateWriter& archive);
+template void MemorySystem::State(StateReader& archive);
+template void MemorySystem::StateOfLevels(StateWriter& archive);
+template void MemorySystem::StateOfLevels(StateReader& archive);
 
 }  // namespace tutti::internal

@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/byte_stream.h"
 #include "loopclosure/memory/belief.h"
 #include "tutti/loopclosure/detector.h"
 
@@ -33,14 +32,18 @@ class PoseTrack {
   /// or no place has.
   std::vector<double> Gains(const std::vector<int>& working_memory) const;
 
-  void Save(ByteWriter& out) const;
-  /// Takes up what Save wrote, in place of what is known. Throws InputError if that is damaged.
-  void Load(ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   struct Station {
     std::optional<PosePrior> prior;
     double way_m = 0;  // up to here, over all stations with a prior of the same frame in a row
+
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(prior, way_m);
+    }
   };
   std::vector<Station> stations_;  // by slot
   double way_m_ = 0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/index.h"
+
 namespace tutti {
 namespace {
 
@@ -20,12 +22,12 @@ const std::array<double, TransitionModel::kLevels + 1>& TransitionModel::LevelVa
 }
 
 void TransitionModel::Update(const LocationMemory& memory, const std::vector<int>& changed_slots) {
-  columns_.resize(static_cast<std::size_t>(memory.size()));
+  columns_.resize(internal::Index(memory.size()));
   std::vector<int> dirty;
   for (const int slot : changed_slots) {
-    if (memory.state(slot) != LocationMemory::State::kWorking) {
-      if (columns_[static_cast<std::size_t>(slot)].Empty()) continue;  // no path led through it
-      columns_[static_cast<std::size_t>(slot)] = Runs();
+    if (memory.state(slot) != LocationState::kWorking) {
+      if (columns_[internal::Index(slot)].Empty()) continue;  // no path led through it
+      columns_[internal::Index(slot)] = Runs();
       // Paths that led through it are cut: all within reach of those that it was linked to.
       for (const LocationMemory::Link& link : memory.links(slot)) {
         for (const auto& [near, level, loops] : memory.Neighbours(link.slot, kLevels)) dirty.push_back(near);
@@ -37,7 +39,7 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   std::sort(dirty.begin(), dirty.end());
   dirty.erase(std::unique(dirty.begin(), dirty.end()), dirty.end());
   for (const int j : dirty) {
-    Runs& column = columns_[static_cast<std::size_t>(j)];
+    Runs& column = columns_[internal::Index(j)];
     column = ComputeColumn(memory, j);
     ShareInner(column);
   }
@@ -56,7 +58,7 @@ TransitionModel::Runs TransitionModel::ComputeColumn(const LocationMemory& memor
   std::vector<std::pair<int, double>> column;
   double sum = 0.0;
   for (const auto& [neighbour, level, loops] : memory.Neighbours(slot, kLevels)) {
-    const double value = LevelValues()[static_cast<std::size_t>(level)] * std::pow(kLoopShare, loops);
+    const double value = LevelValues()[internal::Index(level)] * std::pow(kLoopShare, loops);
     column.emplace_back(neighbour, value);
     sum += value;
   }
@@ -95,10 +97,10 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
   predicted.places.assign(posterior.places.size(), 0.0);
   double real = 0.0;
   for (const int j : working_memory) {
-    const double p = posterior.places[static_cast<std::size_t>(j)];
+    const double p = posterior.places[internal::Index(j)];
     if (p <= 0.0) continue;
     real += p;
-    ForEachRun(columns_[static_cast<std::size_t>(j)], [&](int first, int count, const double* values) {
+    ForEachRun(columns_[internal::Index(j)], [&](int first, int count, const double* values) {
       double* const to = predicted.places.data() + first;
       for (int i = 0; i < count; ++i) to[i] += values[i] * p;
     });
@@ -110,7 +112,7 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
   predicted.new_place = kStaysNew * posterior.new_place + kToNewPlace * real;
   const double from_virtual =
       (1.0 - kStaysNew) * posterior.new_place / static_cast<double>(working_memory.size());
-  for (const int i : working_memory) predicted.places[static_cast<std::size_t>(i)] += from_virtual;
+  for (const int i : working_memory) predicted.places[internal::Index(i)] += from_virtual;
   return predicted;
 }
 
@@ -119,13 +121,13 @@ Belief TransitionModel::Backward(const Belief& value, const std::vector<int>& wo
   before.places.assign(value.places.size(), 0.0);
   double all = 0.0;
   for (const int j : working_memory) {
-    all += value.places[static_cast<std::size_t>(j)];
+    all += value.places[internal::Index(j)];
     double sum = kToNewPlace * value.new_place;
-    ForEachRun(columns_[static_cast<std::size_t>(j)], [&](int first, int count, const double* values) {
+    ForEachRun(columns_[internal::Index(j)], [&](int first, int count, const double* values) {
       const double* const of = value.places.data() + first;
       for (int i = 0; i < count; ++i) sum += values[i] * of[i];
     });
-    before.places[static_cast<std::size_t>(j)] = sum;
+    before.places[internal::Index(j)] = sum;
   }
   if (working_memory.empty()) return before;
   before.new_place =
@@ -135,7 +137,7 @@ Belief TransitionModel::Backward(const Belief& value, const std::vector<int>& wo
 
 std::vector<std::pair<int, double>> TransitionModel::Column(int slot) const {
   std::vector<std::pair<int, double>> column;
-  ForEachRun(columns_[static_cast<std::size_t>(slot)], [&](int first, int count, const double* values) {
+  ForEachRun(columns_[internal::Index(slot)], [&](int first, int count, const double* values) {
     for (int i = 0; i < count; ++i) column.emplace_back(first + i, values[i]);
   });
   return column;

@@ -26,8 +26,8 @@ class TransitionModel {
   static const std::array<double, kLevels + 1>& LevelValues();
   static constexpr double kToNewPlace = 0.1;  ///< p(-1 | j)
   static constexpr double kStaysNew = 0.9;    ///< p(-1 | -1), as in Labbe & Michaud 2013
-  /// Of a place behind a loop link, times the value of its level: the link may be false, and a true one has
-  /// the images' own evidence at both ends.
+  /// Factor of a place behind a loop link, times the value of its level: the link may be false, and a true
+  /// one has the images' own evidence at both ends.
   static constexpr double kLoopShare = 0.2;
 
   /// Takes in what has changed in the memory since the last call.

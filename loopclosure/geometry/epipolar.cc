@@ -4,6 +4,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/dense_solvers.h"
+#include "core/index.h"
 
 namespace tutti::internal {
 namespace {
@@ -12,12 +13,12 @@ constexpr std::size_t kMinMatches = 8;
 
 cv::UsacParams Usac(const EpipolarSettings& settings, double threshold) {
   cv::UsacParams parameters;
-  parameters.confidence = settings.confidence;
+  parameters.confidence = 0.9999;
   parameters.isParallel = false;
   parameters.loIterations = 10;
   parameters.loMethod = cv::LOCAL_OPTIM_INNER_LO;
   parameters.loSampleSize = 14;
-  parameters.maxIterations = settings.max_iterations;
+  parameters.maxIterations = 1000;
   parameters.neighborsSearch = cv::NEIGH_GRID;
   parameters.randomGeneratorState = static_cast<int>(settings.seed & 0x7fffffff);
   parameters.sampler = cv::SAMPLING_UNIFORM;
@@ -58,7 +59,7 @@ int FittedByRotation(const Eigen::Matrix3d& R, double focal, const std::vector<c
                      double threshold) {
   int fitted = 0;
   for (const int i : inliers) {
-    const std::size_t k = static_cast<std::size_t>(i);
+    const std::size_t k = Index(i);
     const Eigen::Vector3d turned = R * Eigen::Vector3d(first[k].x, first[k].y, focal);
     if (turned.z() <= 0) continue;
     const double error = std::hypot(focal * turned.x() / turned.z() - second[k].x,

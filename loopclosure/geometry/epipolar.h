@@ -13,8 +13,6 @@ namespace tutti::internal {
 
 struct EpipolarSettings {
   double threshold_px = 1.5;
-  double confidence = 0.9999;
-  int max_iterations = 1000;
   std::uint64_t seed = 1;
 };
 
@@ -28,8 +26,7 @@ struct EpipolarResult {
 EpipolarResult FitFundamental(const std::vector<cv::Point2f>& first, const std::vector<cv::Point2f>& second,
                               const EpipolarSettings& settings);
 
-/// The same with calibration (the cameras may differ, and may distort); points behind a camera are no
-/// inliers.
+/// Fits with calibration (the cameras may differ, and may distort); points behind a camera are no inliers.
 EpipolarResult FitEssential(const std::vector<cv::Point2f>& first, const PinholeCamera& first_camera,
                             const std::vector<cv::Point2f>& second, const PinholeCamera& second_camera,
                             const EpipolarSettings& settings);
@@ -41,9 +38,8 @@ struct HomographyResult {
   Eigen::Quaterniond R_second_first = Eigen::Quaterniond::Identity();  ///< only if turned
 };
 
-/// The homography first -> second: of a flat scene, or of a camera that turned
-/// on the spot. Without both cameras their distortion stays in the pixels. At
-/// least 8 matches.
+/// The homography first -> second: of a flat scene, or of a camera that turned on the spot. Without both
+/// cameras their distortion stays in the pixels. At least 8 matches.
 HomographyResult FitHomography(const std::vector<cv::Point2f>& first,
                                const std::optional<PinholeCamera>& first_camera,
                                const std::vector<cv::Point2f>& second,

@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "loopclosure/geometry/verification.h"
+
 namespace tutti::internal {
 
 /// What the matches of two images are held to.
@@ -34,8 +36,7 @@ constexpr int kGridColumns = 8, kGridRows = 6;
 /// The cell of a grid of 8x6 over the image, row by row; of the nearest for a pixel outside.
 int GridCell(const cv::Point2f& pixel, const cv::Size& image);
 
-/// Cells of that grid with at least one of the pixels, 0..48; pixels outside count in the
-/// nearest cell.
+/// Cells of that grid with at least one of the pixels, 0..48; pixels outside count in the nearest cell.
 int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image);
 
 /// Root of the mean squared deviation of the displacements first -> second from their mean, as a share of the
@@ -50,5 +51,14 @@ double NarrowestSpread(const std::vector<cv::Point2f>& pixels, const cv::Size& i
 /// How wide that has to be for `inliers` in abundance, beyond 1.5 times the `least`: they may lie closer
 /// together, down to 0.6 of `spread`.
 double SpreadNeeded(double spread, int least, int inliers);
+
+/// True for a match whose ends are less than `static_px` apart: nothing moved there.
+bool StaysAtItsPixel(const VerifiedMatch& match, double static_px);
+
+/// Share of the features (of all sets; where the two views differ, of the one with fewer) that lie apart from
+/// these matches: in cells of an 8x6 grid over the image that hold none of them, nor do the cells around.
+/// Near 0 where the camera stands as it stood: it sees the same everywhere. Large where only a part of the
+/// image is the same whatever lies behind it. 0 without features.
+double ShareApart(const std::vector<VerifiedMatch>& matches, const View& query, const View& candidate);
 
 }  // namespace tutti::internal

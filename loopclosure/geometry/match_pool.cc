@@ -1,4 +1,3 @@
-#include "loopclosure/geometry/match_pool.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "core/index.h"
 #include "core/parallel.h"
 #include "loopclosure/geometry/matching.h"
 
@@ -15,19 +15,19 @@ namespace {
 const Eigen::Vector3f kUnknown = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
 
 Eigen::Vector3f PointOf(const View::Set& set, int index) {
-  return set.points.empty() ? kUnknown : set.points[static_cast<std::size_t>(index)];
+  return set.points.empty() ? kUnknown : set.points[Index(index)];
 }
 
 int NumberOf(const View::Set& set, int index) {
-  return set.numbers.empty() ? index : set.numbers[static_cast<std::size_t>(index)];
+  return set.numbers.empty() ? index : set.numbers[Index(index)];
 }
 
 void AppendMatches(const View::Set& query, const View::Set& candidate, const std::vector<Match>& matches,
                    bool is_caller, std::vector<PooledMatch>& pool) {
   for (const Match& m : matches) {
     PooledMatch match;
-    match.query = query.pixels[static_cast<std::size_t>(m.query)];
-    match.candidate = candidate.pixels[static_cast<std::size_t>(m.candidate)];
+    match.query = query.pixels[Index(m.query)];
+    match.candidate = candidate.pixels[Index(m.candidate)];
     match.query_point = PointOf(query, m.query);
     match.candidate_point = PointOf(candidate, m.candidate);
     if (is_caller) {
@@ -39,9 +39,8 @@ void AppendMatches(const View::Set& query, const View::Set& candidate, const std
   }
 }
 
-// All members find the same corners: one match per place in either image, so
-// that inliers count independent evidence. The caller's come first (the SLAM
-// map hangs on them), then the most certain.
+// All members find the same corners: one match per place in either image, so that inliers count independent
+// evidence. The caller's come first (the SLAM map hangs on them), then the most certain.
 std::vector<PooledMatch> OnePerPlace(std::vector<PooledMatch> pool) {
   constexpr float kCell = 4.0f;  // [px]
   std::stable_sort(pool.begin(), pool.end(), [](const PooledMatch& a, const PooledMatch& b) {
@@ -74,7 +73,7 @@ std::vector<PooledMatch> PoolMatches(const View& query, const View& candidate, d
   const std::size_t members = std::min(query.members.size(), candidate.members.size());
   std::vector<std::vector<Match>> matches(members + 1);
   RunParallel(static_cast<int>(members) + 1, threads, [&](int task) {
-    const std::size_t k = static_cast<std::size_t>(task);
+    const std::size_t k = Index(task);
     const View::Set& q = k < members ? query.members[k] : query.caller;
     const View::Set& c = k < members ? candidate.members[k] : candidate.caller;
     matches[k] = MatchDescriptors(q.descriptors.Unpacked(), c.descriptors.Unpacked(), c.pixels, max_ratio);

@@ -1,10 +1,10 @@
 #include "loopclosure/geometry/motion.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <numeric>
 
+#include "core/index.h"
 #include "loopclosure/geometry/epipolar.h"
 
 namespace tutti::internal {
@@ -21,8 +21,8 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
   std::vector<cv::Point2f> pixels_q;
   std::vector<cv::Point2f> pixels_c;
   for (const int i : of) {
-    pixels_q.push_back(pool[static_cast<std::size_t>(i)].query);
-    pixels_c.push_back(pool[static_cast<std::size_t>(i)].candidate);
+    pixels_q.push_back(pool[Index(i)].query);
+    pixels_c.push_back(pool[Index(i)].candidate);
   }
   EpipolarSettings settings;
   settings.threshold_px = options.epipolar_px;
@@ -50,7 +50,7 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
       if (points.turned) motion.T_candidate_query = Pose(points.R_second_first.conjugate(), {0, 0, 0});
     }
   }
-  for (const int i : inliers) motion.inliers.push_back(of[static_cast<std::size_t>(i)]);
+  for (const int i : inliers) motion.inliers.push_back(of[Index(i)]);
   // What a homography explains fits lines as well: by lines, the figures of flat and of deep scenes compare.
   motion.chance = FitByChance(calibrated ? FitModel::kEssential : FitModel::kFundamental, motion.considered,
                               static_cast<int>(inliers.size()), options.epipolar_px, size);

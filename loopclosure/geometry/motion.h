@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "loopclosure/geometry/evidence.h"
-#include "loopclosure/geometry/match_pool.h"
+#include "loopclosure/geometry/matching.h"
 #include "loopclosure/geometry/verification.h"
 #include "tutti/core/pose.h"
 
@@ -25,11 +25,10 @@ struct Motion {
                            ///< only turned
 };
 
-/// Essential matrix where both views have a camera, else fundamental matrix; a
-/// homography where that explains nine tenths of what they do.
-/// Views of the same number of cameras (View::cameras): each with its like, or
-/// each with its opposite (left with right, for a drive the other way) if that
-/// explains more; inliers and evidence are summed.
+/// Essential matrix where both views have a camera, else fundamental matrix; a homography where that explains
+/// nine tenths of what they do. Views of the same number of cameras (View::cameras): each with its like, or
+/// each with its opposite (left with right, for a drive the other way) if that explains more; inliers and
+/// evidence are summed.
 Motion FitMotion(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
                  const VerificationOptions& options, std::uint64_t seed);
 

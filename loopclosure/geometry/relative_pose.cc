@@ -1,13 +1,16 @@
-#include "tutti/loopclosure/relative_pose.h"
-
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <opencv2/calib3d.hpp>
+#include <random>
+#include <vector>
 
+#include "core/index.h"
 #include "core/least_squares.h"
 #include "core/reprojection.h"
 #include "core/umeyama.h"
-#include "loopclosure/geometry/ransac.h"
+#include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {
 namespace {
@@ -34,6 +37,49 @@ std::string TooFew(const char* what, std::size_t have, int need) {
   return "only " + std::to_string(have) + " " + what + ", " + std::to_string(need) + " are needed";
 }
 
+// RANSAC with a truncated-squares score (MSAC, Torr & Zisserman 2000) and a generator of its own.
+
+constexpr int kSample = 3;  // matches that a model is fitted to
+
+// `fit(sample)` gives the models through the sampled indices; `error(model, i)` the squared error of datum i
+// relative to the squared threshold (1 = at the threshold; infinity where impossible). Returns the inliers
+// of the best model and sets `best`. Deterministic for a seed: the generator is local and the draws do not
+// depend on the standard library.
+template <typename Model, typename Fit, typename Error>
+std::vector<int> Ransac(int count, const RelativePoseOptions& options, const Fit& fit, const Error& error,
+                        Model& best) {
+  std::vector<int> best_inliers;
+  if (count < kSample) return best_inliers;
+  std::mt19937_64 generator(options.seed);
+  double best_cost = static_cast<double>(count);
+  int needed = options.max_iterations;
+  std::vector<int> sample;
+  for (int iteration = 0; iteration < needed; ++iteration) {
+    sample.clear();
+    while (static_cast<int>(sample.size()) < kSample) {
+      const int i = static_cast<int>(generator() % static_cast<std::uint64_t>(count));
+      if (std::find(sample.begin(), sample.end(), i) == sample.end()) sample.push_back(i);
+    }
+    for (const Model& model : fit(sample)) {
+      double cost = 0.0;
+      for (int i = 0; i < count && cost < best_cost; ++i) cost += std::min(1.0, error(model, i));
+      if (!(cost < best_cost)) continue;
+      best_cost = cost;
+      best = model;
+      best_inliers.clear();
+      for (int i = 0; i < count; ++i) {
+        if (error(model, i) < 1.0) best_inliers.push_back(i);
+      }
+      const double share = static_cast<double>(best_inliers.size()) / count;
+      const double miss = 1.0 - std::pow(share, kSample);
+      if (miss <= 0.0) return best_inliers;
+      const double wanted = std::ceil(std::log(1.0 - options.confidence) / std::log(miss));
+      needed = static_cast<int>(std::min<double>(options.max_iterations, std::max(20.0, wanted)));
+    }
+  }
+  return best_inliers;
+}
+
 // ---------------------------------------------------------------- PnP
 
 struct PnpProblem {
@@ -47,8 +93,8 @@ std::vector<Pose> FitP3p(const PnpProblem& problem, const std::vector<int>& samp
   std::vector<cv::Point3d> object;
   std::vector<cv::Point2d> image;
   for (const int i : sample) {
-    const Eigen::Vector3d& p = problem.points[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d& u = problem.pixels[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d& p = problem.points[internal::Index(i)];
+    const Eigen::Vector2d& u = problem.pixels[internal::Index(i)];
     object.emplace_back(p.x(), p.y(), p.z());
     image.emplace_back((u.x() - problem.camera.cx) / problem.camera.fx,
                        (u.y() - problem.camera.cy) / problem.camera.fy);
@@ -86,7 +132,7 @@ bool RefinePnp(const PnpProblem& problem, const std::vector<int>& inliers, doubl
     for (const int i : inliers) {
       Eigen::Vector2d r;
       Reprojection::PoseJacobian j;
-      if (!PnpTerms(problem, T_camera_points, static_cast<std::size_t>(i), r, j)) continue;
+      if (!PnpTerms(problem, T_camera_points, internal::Index(i), r, j)) continue;
       equations.Add(j, r, internal::HuberWeight(r.squaredNorm(), huber_px * huber_px));
     }
   };
@@ -111,7 +157,7 @@ std::vector<int> PnpInliers(const PnpProblem& problem, const Pose& T_camera_poin
 void FinishPnp(const PnpProblem& problem, const RelativePoseOptions& options, PnpResult& result) {
   double squares = 0.0;
   for (const int i : result.inliers) {
-    const std::size_t k = static_cast<std::size_t>(i);
+    const std::size_t k = internal::Index(i);
     Eigen::Vector2d r;
     Reprojection::PoseJacobian j;
     if (!PnpTerms(problem, result.T_camera_points, k, r, j)) continue;
@@ -152,8 +198,8 @@ std::vector<ScoredSimilarity> FitSimilarity(const SimilarityProblem& problem,
   std::vector<Eigen::Vector3d> a;
   std::vector<Eigen::Vector3d> b;
   for (const int i : sample) {
-    a.push_back(problem.points_a[static_cast<std::size_t>(i)]);
-    b.push_back(problem.points_b[static_cast<std::size_t>(i)]);
+    a.push_back(problem.points_a[internal::Index(i)]);
+    b.push_back(problem.points_b[internal::Index(i)]);
   }
   const std::optional<Similarity> S = internal::Umeyama(a, b, true);
   if (!S || !(S->scale > 0.0)) return {};
@@ -190,7 +236,7 @@ bool RefineSimilarity(const SimilarityProblem& problem, const std::vector<int>& 
     for (const int i : inliers) {
       Eigen::Vector2d r[2];
       Jacobian2x7 j[2];
-      if (!SimilarityTerms(problem, S_a_b, S_b_a, static_cast<std::size_t>(i), r, j)) continue;
+      if (!SimilarityTerms(problem, S_a_b, S_b_a, internal::Index(i), r, j)) continue;
       for (int side = 0; side < 2; ++side) {
         equations.Add(j[side], r[side], internal::HuberWeight(r[side].squaredNorm(), huber_px * huber_px));
       }
@@ -223,7 +269,7 @@ void FinishSimilarity(const SimilarityProblem& problem, const RelativePoseOption
   for (const int i : result.inliers) {
     Eigen::Vector2d r[2];
     Jacobian2x7 j[2];
-    if (!SimilarityTerms(problem, result.S_a_b, S_b_a, static_cast<std::size_t>(i), r, j)) continue;
+    if (!SimilarityTerms(problem, result.S_a_b, S_b_a, internal::Index(i), r, j)) continue;
     for (int side = 0; side < 2; ++side) {
       squares += 0.5 * r[side].squaredNorm();
       result.information += j[side].transpose() * j[side] / variance;
@@ -277,12 +323,11 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
   for (const Eigen::Vector2d& pixel : pixels) problem.pixels.push_back(UndistortedPixel(camera, pixel));
 
   const double squared = options.threshold_px * options.threshold_px;
-  const internal::RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
-  result.inliers = internal::Ransac<Pose>(
-      static_cast<int>(points.size()), settings,
+  result.inliers = Ransac<Pose>(
+      static_cast<int>(points.size()), options,
       [&](const std::vector<int>& sample) { return FitP3p(problem, sample); },
       [&](const Pose& pose, int i) {
-        const std::size_t k = static_cast<std::size_t>(i);
+        const std::size_t k = internal::Index(i);
         return SquaredError(camera, pose * problem.points[k], problem.pixels[k]) / squared;
       },
       result.T_camera_points);
@@ -322,13 +367,12 @@ SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
   for (const Eigen::Vector2d& pixel : pixels_b) problem.pixels_b.push_back(UndistortedPixel(camera_b, pixel));
 
   const double squared = options.threshold_px * options.threshold_px;
-  const internal::RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
   ScoredSimilarity best;
-  result.inliers = internal::Ransac<ScoredSimilarity>(
-      static_cast<int>(n), settings,
+  result.inliers = Ransac<ScoredSimilarity>(
+      static_cast<int>(n), options,
       [&](const std::vector<int>& sample) { return FitSimilarity(problem, sample); },
       [&](const ScoredSimilarity& model, int i) {
-        return SimilarityError(problem, model.S_a_b, model.S_b_a, static_cast<std::size_t>(i)) / squared;
+        return SimilarityError(problem, model.S_a_b, model.S_b_a, internal::Index(i)) / squared;
       },
       best);
   result.S_a_b = best.S_a_b;

@@ -6,16 +6,24 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "core/index.h"
 #include "loopclosure/geometry/evidence.h"
-#include "loopclosure/geometry/match_pool.h"
+#include "loopclosure/geometry/matching.h"
 #include "loopclosure/geometry/motion.h"
-#include "loopclosure/geometry/static_features.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {
 namespace {
 
 using internal::PooledMatch;
+
+// What is verified, and how.
+struct Pair {
+  const View& query;
+  const View& candidate;
+  const VerificationOptions& options;
+  std::uint64_t seed;
+};
 
 __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
   std::array<char, 200> text{};
@@ -24,17 +32,6 @@ __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...
   std::vsnprintf(text.data(), text.size(), format, arguments);
   va_end(arguments);
   return text.data();
-}
-
-// What the inliers are worth, whatever the bars say of them.
-void FillEvidence(const std::vector<cv::Point2f>& in_query, const std::vector<cv::Point2f>& in_candidate,
-                  const internal::ChanceFit& chance, const View& query, const View& candidate,
-                  Verification& result) {
-  result.expected_inliers = chance.expected;
-  result.log_nfa = chance.log_nfa;
-  result.coverage = std::min(internal::OccupiedCells(in_query, query.size),
-                             internal::OccupiedCells(in_candidate, candidate.size));
-  result.motion_spread = internal::MotionSpread(in_query, in_candidate, query.size);
 }
 
 // The least number of inliers and the least share of the matches.
@@ -62,20 +59,24 @@ bool BeyondChance(const Verification& result) {
 
 // Fills counts, evidence, matched pixels, `similar` and `accepted`, and what the inliers lack.
 void Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers,
-           const internal::ChanceFit& chance, int considered, const View& query, const View& candidate,
-           const VerificationOptions& options, Verification& result) {
+           const internal::ChanceFit& chance, int considered, const Pair& pair, Verification& result) {
+  const auto& [query, candidate, options, seed] = pair;
   result.matches = considered;
   result.inliers = static_cast<int>(inliers.size());
   result.inlier_matches.clear();
   std::vector<cv::Point2f> in_query;
   std::vector<cv::Point2f> in_candidate;
   for (const int i : inliers) {
-    const PooledMatch& m = pool[static_cast<std::size_t>(i)];
+    const PooledMatch& m = pool[internal::Index(i)];
     result.inlier_matches.push_back({m.query, m.candidate, m.query_feature, m.candidate_feature});
     in_query.push_back(m.query);
     in_candidate.push_back(m.candidate);
   }
-  FillEvidence(in_query, in_candidate, chance, query, candidate, result);
+  result.expected_inliers = chance.expected;
+  result.log_nfa = chance.log_nfa;
+  result.coverage = std::min(internal::OccupiedCells(in_query, query.size),
+                             internal::OccupiedCells(in_candidate, candidate.size));
+  result.motion_spread = internal::MotionSpread(in_query, in_candidate, query.size);
   const Bars bars = BarsFor(result, options);
   const double ratio = static_cast<double>(inliers.size()) / static_cast<double>(considered);
   const double needed = internal::SpreadNeeded(options.min_spread, bars.inliers, std::max(1, result.inliers));
@@ -113,8 +114,8 @@ Eigen::Vector2d Pixel(const cv::Point2f& p) { return {p.x, p.y}; }
 
 // PnP on the candidate's points in metres. False if too few matches have one, so that something else must
 // decide.
-bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
-                 const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+bool VerifyRigid(const std::vector<PooledMatch>& pool, const Pair& pair, Verification& result) {
+  const auto& [query, candidate, options, seed] = pair;
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Vector2d> pixels;
   std::vector<int> index;
@@ -127,13 +128,13 @@ bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const 
   if (static_cast<int>(points.size()) < options.min_inliers) return false;
   const PnpResult pnp = SolvePnp(points, pixels, *query.camera, PoseOptions(options, seed));
   std::vector<int> inliers;
-  for (const int i : pnp.inliers) inliers.push_back(index[static_cast<std::size_t>(i)]);
+  for (const int i : pnp.inliers) inliers.push_back(index[internal::Index(i)]);
   result.type = ConstraintType::kRigid;
   const int considered = static_cast<int>(points.size());
   const internal::ChanceFit chance =
       internal::FitByChance(internal::FitModel::kPnp, considered, static_cast<int>(inliers.size()),
                             options.reprojection_px, query.size);
-  Judge(pool, inliers, chance, considered, query, candidate, options, result);
+  Judge(pool, inliers, chance, considered, pair, result);
   result.S_candidate_query = Similarity(pnp.T_camera_points.Inverse());
   result.information = pnp.information;
   return true;
@@ -142,14 +143,14 @@ bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const 
 // Mono: 3D-3D where both images have points. Called after the pixels have accepted. Points that don't fit are
 // no veto: those of an image that is new were seen twice, and err by more than pixels do; a place is right
 // where a motion is not yet.
-void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers, const View& query,
-                   const View& candidate, const VerificationOptions& options, std::uint64_t seed,
+void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers, const Pair& pair,
                    Verification& result) {
+  const auto& [query, candidate, options, seed] = pair;
   constexpr int kMinInliers = 12;
   std::vector<Eigen::Vector3d> points_c, points_q;
   std::vector<Eigen::Vector2d> pixels_c, pixels_q;
   for (const int i : inliers) {
-    const PooledMatch& m = pool[static_cast<std::size_t>(i)];
+    const PooledMatch& m = pool[internal::Index(i)];
     if (!m.candidate_point.allFinite() || !m.query_point.allFinite()) continue;
     points_c.push_back(m.candidate_point.cast<double>());
     points_q.push_back(m.query_point.cast<double>());
@@ -171,12 +172,12 @@ void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>&
   if (fit.information(6, 6) > 0) result.information -= cross * cross.transpose() / fit.information(6, 6);
 }
 
-void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
-                    const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+void VerifyByPixels(const std::vector<PooledMatch>& pool, const Pair& pair, Verification& result) {
+  const auto& [query, candidate, options, seed] = pair;
   const internal::Motion motion = internal::FitMotion(pool, query, candidate, options, seed);
   result.type = motion.type;
   result.homography = motion.homography;
-  Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
+  Judge(pool, motion.inliers, motion.chance, motion.considered, pair, result);
   if (result.similar && motion.fewest >= 0) {
     // Each that sees much must find its share: a facade that exists twice is on one side only.
     const double even = BarsFor(result, options).inliers / static_cast<double>(query.cameras.size());
@@ -190,13 +191,13 @@ void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, con
   const bool calibrated = motion.type == ConstraintType::kEssential;
   if (calibrated) result.S_candidate_query = Similarity(motion.T_candidate_query);
   if (calibrated && result.accepted && !(query.metric && candidate.metric)) {
-    AddSimilarity(pool, motion.inliers, query, candidate, options, seed, result);
+    AddSimilarity(pool, motion.inliers, pair, result);
   }
 }
 
 // By the geometry that is known, all bars but those on what does not move.
-Verification Decide(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
-                    const VerificationOptions& options, std::uint64_t seed) {
+Verification Decide(const std::vector<PooledMatch>& pool, const Pair& pair) {
+  const auto& [query, candidate, options, seed] = pair;
   Verification result;
   result.candidate = candidate.id;
   result.matches = static_cast<int>(pool.size());
@@ -205,18 +206,17 @@ Verification Decide(const std::vector<PooledMatch>& pool, const View& query, con
         Format("only %d features match, %d are needed", result.matches, options.min_place_inliers);
     return result;
   }
-  if (query.camera && candidate.metric && query.metric &&
-      VerifyRigid(pool, query, candidate, options, seed, result)) {
+  if (query.camera && candidate.metric && query.metric && VerifyRigid(pool, pair, result)) {
     return result;
   }
-  VerifyByPixels(pool, query, candidate, options, seed, result);
+  VerifyByPixels(pool, pair, result);
   return result;
 }
 
 // Where most inliers are at the same pixel in both images, either the camera stands where it stood and sees
 // the same everywhere, or it carries them along: then the others must do without them.
-void DoWithoutStatic(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
-                     const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+void DoWithoutStatic(const std::vector<PooledMatch>& pool, const Pair& pair, Verification& result) {
+  const auto& [query, candidate, options, seed] = pair;
   constexpr double kMostApart = 0.15;
   std::vector<VerifiedMatch> still;
   for (const VerifiedMatch& match : result.inlier_matches) {
@@ -229,7 +229,7 @@ void DoWithoutStatic(const std::vector<PooledMatch>& pool, const View& query, co
     if (!internal::StaysAtItsPixel({m.query, m.candidate, -1, -1}, options.static_px)) moving.push_back(m);
   }
   const int all = result.inliers;
-  result = Decide(moving, query, candidate, options, seed);  // and its evidence, whatever comes of it
+  result = Decide(moving, pair);  // and its evidence, whatever comes of it
   if (result.similar) return;
   result.reason =
       Format("only features that do not move with the camera agree (%d of %d are at the same pixel)",
@@ -243,9 +243,10 @@ Verification GeometricVerifier::Verify(const View& query, const View& candidate,
       internal::PoolMatches(query, candidate, options_.match_ratio, threads);
   const std::uint64_t seed = seed_ + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(query.id) +
                              static_cast<std::uint64_t>(candidate.id);
-  Verification result = Decide(pool, query, candidate, options_, seed);
+  const Pair pair = {query, candidate, options_, seed};
+  Verification result = Decide(pool, pair);
   if (result.similar && options_.static_px > 0) {
-    DoWithoutStatic(pool, query, candidate, options_, seed, result);
+    DoWithoutStatic(pool, pair, result);
   }
   return result;
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "loopclosure/store/packed_mat.h"
@@ -24,6 +23,9 @@ struct View {
     internal::PackedMat descriptors;      ///< N rows
     std::vector<Eigen::Vector3f> points;  ///< empty, or N points in the camera frame; NaN where unknown
     std::vector<int> numbers;             ///< the caller's number of each, growing; empty: 0 to N - 1
+
+    template <class Archive>
+    void State(Archive& archive);
   };
   std::int64_t id = -1;                 ///< of the query that it was made of
   cv::Size size;                        ///< of the image [px]
@@ -32,6 +34,10 @@ struct View {
   std::vector<Set> members;             ///< one per member
   Set caller;                           ///< the caller's own; may be empty
   bool metric = true;                   ///< 3D points are in metres
+
+  /// For saved detectors and the long-term memory's file.
+  template <class Archive>
+  void State(Archive& archive);
 };
 
 /// The view of a query. Depth at a keypoint is the median of the 3x3 pixels around it; unknown where they

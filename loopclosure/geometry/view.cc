@@ -1,12 +1,26 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
+#include <optional>
+#include <vector>
 
+#include "core/index.h"
+#include "core/state_archive.h"
 #include "loopclosure/geometry/verification.h"
 
 namespace tutti {
 namespace {
+
+// What MakeView gives a feature without a point; all others are saved.
+Eigen::Vector3f UnknownPoint() { return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()); }
+bool IsUnknown(const Eigen::Vector3f& point) {
+  const Eigen::Vector3f unknown = UnknownPoint();
+  // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): these bits of all that are no number
+  return std::memcmp(point.data(), unknown.data(), sizeof(float) * 3) == 0;
+}
 
 // Depth at a pixel: median of the valid among 3x3; 0 where it is unknown or the pixels disagree.
 float DepthAt(const cv::Mat& depth_m, const cv::Point2f& pixel, const VerificationOptions& options) {
@@ -38,8 +52,7 @@ View::Set MakeSet(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& des
 
 void LookUpDepth(const LoopQuery& query, const VerificationOptions& options, View::Set& set) {
   if (query.depth_m.empty() || query.depth_m.type() != CV_32FC1 || !query.camera) return;
-  const Eigen::Vector3f unknown = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
-  if (set.points.empty()) set.points.assign(set.pixels.size(), unknown);
+  if (set.points.empty()) set.points.assign(set.pixels.size(), UnknownPoint());
   for (std::size_t i = 0; i < set.pixels.size(); ++i) {
     if (set.points[i].allFinite()) continue;
     const float z = DepthAt(query.depth_m, set.pixels[i], options);
@@ -67,7 +80,7 @@ void DropMasked(const cv::Mat& mask, View::Set& set) {
   set = std::move(kept);
 }
 
-// Of the image; without one (the caller extracts all features) of the camera, or what the features reach
+// Size of the image; without one (the caller extracts all features) of the camera, or what the features reach
 // over.
 cv::Size SizeOf(const LoopQuery& query, const std::vector<Features>& members) {
   if (!query.image.empty()) return query.image.size();
@@ -104,5 +117,110 @@ View MakeView(const LoopQuery& query, const std::vector<Features>& members,
   if (query.metric) LookUpDepth(query, options, view.caller);
   return view;
 }
+
+namespace {
+
+// No points, or one for each of `features`: whether it is known, a bit each, and those that are.
+template <class Archive>
+void StateOfPoints(Archive& archive, std::size_t features, std::vector<Eigen::Vector3f>& points) {
+  std::vector<std::uint8_t> is_known((points.size() + 7) / 8, 0);
+  std::vector<float> known;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (IsUnknown(points[i])) continue;
+    is_known[i / 8] = static_cast<std::uint8_t>(is_known[i / 8] | 1U << i % 8);
+    known.insert(known.end(), points[i].begin(), points[i].end());
+  }
+  std::uint64_t count = points.size();
+  archive(count, is_known, internal::Planes{&known});
+  if constexpr (Archive::kReading) {
+    if ((count != 0 && count != features) || is_known.size() != (count + 7) / 8)
+      archive.Damaged("features without points");
+    points.assign(count, UnknownPoint());
+    auto next = known.begin();
+    for (std::size_t i = 0; i < count; ++i) {
+      if ((is_known[i / 8] & 1U << i % 8) == 0) continue;
+      if (known.end() - next < 3) archive.Damaged("features without points");
+      points[i] = {next[0], next[1], next[2]};
+      next += 3;
+    }
+    if (next != known.end()) archive.Damaged("points without features");
+  }
+}
+
+template <class Archive>
+void StateOfCamera(Archive& archive, std::optional<PinholeCamera>& camera) {
+  bool is_there = camera.has_value();
+  archive(is_there);
+  if (!is_there) return;
+  if constexpr (Archive::kReading) camera.emplace();
+  PinholeCamera& c = *camera;
+  archive(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.distortion, c.coefficients);
+  if constexpr (Archive::kReading) {
+    archive.Check(static_cast<int>(c.distortion), 0, static_cast<int>(Distortion::kEquidistant) + 1,
+                  "an unknown lens distortion");
+    if (!c.Validate().empty()) archive.Damaged("a camera that is not usable");
+  }
+}
+
+template <class Archive>
+void StateOfRegions(Archive& archive, std::vector<cv::Rect>& regions) {
+  std::vector<int> sides;
+  for (const cv::Rect& r : regions) sides.insert(sides.end(), {r.x, r.y, r.width, r.height});
+  archive(sides);
+  if constexpr (Archive::kReading) {
+    if (sides.size() % 4 != 0) archive.Damaged("a camera's part of an image without a side");
+    for (std::size_t i = 0; i < sides.size(); i += 4) {
+      regions.emplace_back(sides[i], sides[i + 1], sides[i + 2], sides[i + 3]);
+      const cv::Rect& r = regions.back();
+      const auto beyond = [](int side) { return static_cast<float>(side) > View::kFarthestPixel; };
+      if (r.x < 0 || r.y < 0 || r.width < 1 || r.height < 1 || beyond(r.x) || beyond(r.y) ||
+          beyond(r.width) || beyond(r.height)) {
+        archive.Damaged("a camera's part of an image at an impossible place");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+// Pixels as those of keypoints in a saved odometry (StateOfKeypoints), so that zstd finds the same bytes.
+template <class Archive>
+void View::Set::State(Archive& archive) {
+  std::vector<float> x, y;
+  for (const cv::Point2f& pixel : pixels) {
+    x.push_back(pixel.x);
+    y.push_back(pixel.y);
+  }
+  archive(internal::Planes{&x}, internal::Planes{&y}, descriptors);
+  if constexpr (Archive::kReading) {
+    const auto is_pixel = [](float value) { return std::abs(value) <= kFarthestPixel; };  // false for NaN
+    if (x.size() != y.size() || !std::all_of(x.begin(), x.end(), is_pixel) ||
+        !std::all_of(y.begin(), y.end(), is_pixel)) {
+      archive.Damaged("a feature at an impossible pixel");
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) pixels.emplace_back(x[i], y[i]);
+    if (internal::Index(descriptors.rows()) != pixels.size()) archive.Damaged("features without descriptors");
+  }
+  StateOfPoints(archive, pixels.size(), points);
+}
+
+template <class Archive>
+void View::State(Archive& archive) {
+  archive(id, size.width, size.height, metric);
+  StateOfCamera(archive, camera);
+  StateOfRegions(archive, cameras);
+  archive(caller);  // before the members: next to what it may be like (SectionWriter)
+  archive(members, caller.numbers);
+  if constexpr (Archive::kReading) {
+    if (size.width < 1 || size.height < 1) archive.Damaged("an image of an impossible size");
+    const std::vector<int>& numbers = caller.numbers;
+    if (!numbers.empty() && (numbers.size() != caller.pixels.size() ||
+                             std::any_of(numbers.begin(), numbers.end(), [](int n) { return n < 0; })))
+      archive.Damaged("features without numbers");
+  }
+}
+
+template void View::State(internal::StateWriter& archive);
+template void View::State(internal::StateReader& archive);
 
 }  // namespace tutti

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/byte_stream.h"
 #include "core/index.h"
 #include "core/median.h"
+#include "core/state_archive.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -46,9 +46,9 @@ void DenseModel::Add(const cv::Mat& descriptor) {
   const std::string problem = Problem(descriptor);
   if (!problem.empty()) throw InputError(problem);
   // What was merged away counted for its own image alone.
-  if (!recent_.empty() && state_[Index(recent_.back().slot)] == State::kMerged) recent_.pop_back();
+  if (!recent_.empty() && presence_[Index(recent_.back().slot)] == Presence::kMerged) recent_.pop_back();
   descriptors_.push_back(descriptor);
-  state_.push_back(State::kPresent);
+  presence_.push_back(Presence::kPresent);
   if (!descriptor.empty()) width_ = descriptor.cols;
   if (static_cast<int>(recent_.size()) < kSequence - 1) {
     MakeRecent();
@@ -84,20 +84,20 @@ std::vector<float> DenseModel::Cosines(const cv::Mat& descriptor) const {
 void DenseModel::MakeRecent() {
   recent_.clear();
   for (int slot = size() - 1; slot >= 0 && static_cast<int>(recent_.size()) < kSequence; --slot) {
-    if (state_[Index(slot)] != State::kMerged) recent_.push_back(MakeRow(slot));
+    if (presence_[Index(slot)] != Presence::kMerged) recent_.push_back(MakeRow(slot));
   }
   std::reverse(recent_.begin(), recent_.end());
 }
 
 void DenseModel::Drop(int slot) {
-  state_[Index(slot)] = State::kMerged;
+  presence_[Index(slot)] = Presence::kMerged;
   // Its row stays for the present image.
   descriptors_[Index(slot)] = cv::Mat();
 }
 
 void DenseModel::Remove(int slot) {
-  if (state_[Index(slot)] != State::kPresent) return;
-  state_[Index(slot)] = State::kAbsent;
+  if (presence_[Index(slot)] != Presence::kPresent) return;
+  presence_[Index(slot)] = Presence::kAbsent;
   descriptors_[Index(slot)] = cv::Mat();
   for (Row& row : recent_) {
     if (row.slot == slot) row.cosines.clear();
@@ -106,8 +106,8 @@ void DenseModel::Remove(int slot) {
 }
 
 void DenseModel::Restore(int slot, const cv::Mat& descriptor) {
-  if (state_[Index(slot)] == State::kPresent) return;
-  state_[Index(slot)] = State::kPresent;
+  if (presence_[Index(slot)] == Presence::kPresent) return;
+  presence_[Index(slot)] = Presence::kPresent;
   descriptors_[Index(slot)] = descriptor;
   if (!descriptor.empty()) width_ = descriptor.cols;
   for (Row& row : recent_) {
@@ -121,7 +121,7 @@ void DenseModel::Restore(int slot, const cv::Mat& descriptor) {
 
 void DenseModel::AddAbsent(bool merged) {
   descriptors_.emplace_back();
-  state_.push_back(merged ? State::kMerged : State::kAbsent);
+  presence_.push_back(merged ? Presence::kMerged : Presence::kAbsent);
 }
 
 void DenseModel::FinishLoading() { MakeRecent(); }
@@ -131,7 +131,7 @@ std::vector<int> DenseModel::Path() const {
   path.reserve(descriptors_.size());
   const int newest = recent_.empty() ? -1 : recent_.back().slot;
   for (int slot = 0; slot < size(); ++slot) {
-    if (state_[Index(slot)] != State::kMerged || slot == newest) path.push_back(slot);
+    if (presence_[Index(slot)] != Presence::kMerged || slot == newest) path.push_back(slot);
   }
   return path;
 }
@@ -215,46 +215,27 @@ std::vector<double> DenseModel::ScoresOf(const cv::Mat& descriptor) const {
   return scores;
 }
 
-void SaveDescriptor(const cv::Mat& descriptor, internal::ByteWriter& out) {
-  std::vector<float> values;
-  if (!descriptor.empty()) values.assign(descriptor.ptr<float>(), descriptor.ptr<float>() + descriptor.cols);
-  out.PutVector(values);
-}
-
-cv::Mat LoadDescriptor(internal::ByteReader& in) {
-  const std::vector<float> values = in.GetVector<float>();
-  if (values.empty()) return {};
-  cv::Mat descriptor = cv::Mat(values, true).reshape(1, 1);
-  if (!cv::checkRange(descriptor) || !(std::abs(cv::norm(descriptor) - 1.0) < 1e-3)) {
-    in.Damaged("a descriptor that is not of length 1");
-  }
-  return descriptor;
-}
-
-void DenseModel::Save(internal::ByteWriter& out) const {
-  out.Put<std::uint64_t>(descriptors_.size());
-  for (std::size_t i = 0; i < descriptors_.size(); ++i) {
-    out.Put(static_cast<char>(state_[i]));
-    SaveDescriptor(descriptors_[i], out);
-  }
-}
-
-void DenseModel::Load(internal::ByteReader& in) {
-  const std::size_t count = in.GetCount(1 + sizeof(std::uint64_t));
-  for (std::size_t i = 0; i < count; ++i) {
-    const char state = in.Get<char>();
-    if (state < static_cast<char>(State::kAbsent) || state > static_cast<char>(State::kMerged)) {
-      in.Damaged("a location of an unknown state");
+template <class Archive>
+void DenseModel::State(Archive& archive) {
+  archive(presence_);
+  for (std::size_t i = 0; i < presence_.size(); ++i) {
+    if constexpr (Archive::kReading) descriptors_.emplace_back();
+    cv::Mat& descriptor = descriptors_[i];
+    StateOfDescriptor(archive, descriptor);
+    if constexpr (Archive::kReading) {
+      archive.Check(static_cast<int>(presence_[i]), 0, static_cast<int>(Presence::kMerged) + 1,
+                    "a location of an unknown state");
+      if (descriptor.empty()) continue;
+      if (presence_[i] != Presence::kPresent)
+        archive.Damaged("a descriptor of a location that is not in memory");
+      if (width_ > 0 && descriptor.cols != width_) archive.Damaged("descriptors of several widths");
+      width_ = descriptor.cols;
     }
-    state_.push_back(static_cast<State>(state));
-    descriptors_.push_back(LoadDescriptor(in));
-    const cv::Mat& read = descriptors_.back();
-    if (read.empty()) continue;
-    if (state_.back() != State::kPresent) in.Damaged("a descriptor of a location that is not in memory");
-    if (width_ > 0 && read.cols != width_) in.Damaged("descriptors of several widths");
-    width_ = read.cols;
   }
-  MakeRecent();
+  if constexpr (Archive::kReading) MakeRecent();
 }
+
+template void DenseModel::State(internal::StateWriter& archive);
+template void DenseModel::State(internal::StateReader& archive);
 
 }  // namespace tutti

@@ -2,16 +2,14 @@
 // section 3).
 #pragma once
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
-namespace tutti {
+#include "core/index.h"
 
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
+namespace tutti {
 
 /// Empty if a dense member may have this descriptor of an image (or none), else what is wrong. `width`: of
 /// those before [values], 0: any.
@@ -55,9 +53,9 @@ class DenseModel {
   void FinishLoading();
 
   /// Descriptor of a slot; empty if it has none, or is not in memory.
-  const cv::Mat& descriptor(int slot) const { return descriptors_[static_cast<std::size_t>(slot)]; }
+  const cv::Mat& descriptor(int slot) const { return descriptors_[internal::Index(slot)]; }
   /// True if a slot is in memory, be it without a descriptor.
-  bool Has(int slot) const { return state_[static_cast<std::size_t>(slot)] == State::kPresent; }
+  bool Has(int slot) const { return presence_[internal::Index(slot)] == Presence::kPresent; }
   /// Slots ever added.
   int size() const { return static_cast<int>(descriptors_.size()); }
   /// Empty if a descriptor may be added, else what is wrong.
@@ -68,20 +66,18 @@ class DenseModel {
   ///   z_i = max(0, (s_i - m) / (1.4826 MAD) - 2),   c_i = 20 z_i / (z_i + 4).
   /// 0 with fewer than 12 places, where nothing can stand out.
   std::vector<double> Counts(const std::vector<int>& places) const;
-  /// The same for an image that is no location, by its descriptor alone: s_i = d . d_i.
+  /// Counts for an image that is no location, by its descriptor alone: s_i = d . d_i.
   std::vector<double> CountsOf(const cv::Mat& descriptor, const std::vector<int>& places) const;
   /// For standardised evidence: means of the cosines, 0 where below 0, of every slot for the present image;
   std::vector<double> Scores() const;
   /// and for an image that is no location.
   std::vector<double> ScoresOf(const cv::Mat& descriptor) const;
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
-  enum class State : char { kAbsent, kPresent, kMerged };
+  enum class Presence : char { kAbsent, kPresent, kMerged };
   // Cosines of one of the last images with the descriptors of all slots; 0 where there is none.
   struct Row {
     int slot = -1;
@@ -97,13 +93,24 @@ class DenseModel {
   static std::vector<double> Contrast(std::vector<double> scores, const std::vector<int>& places);
 
   std::vector<cv::Mat> descriptors_;  // by slot
-  std::vector<State> state_;          // by slot
+  std::vector<Presence> presence_;    // by slot
   std::vector<Row> recent_;           // the last slots of the path, newest last
   int width_;                         // of a descriptor; 0: not known yet
 };
 
-/// Appends and reads one descriptor, empty or 1 x D, CV_32F, of length 1. The latter throws InputError.
-void SaveDescriptor(const cv::Mat& descriptor, internal::ByteWriter& out);
-cv::Mat LoadDescriptor(internal::ByteReader& in);
+/// One descriptor: empty or 1 x D, CV_32F, of length 1.
+template <class Archive>
+void StateOfDescriptor(Archive& archive, cv::Mat& descriptor) {
+  std::vector<float> values;
+  if (!Archive::kReading && !descriptor.empty())
+    values.assign(descriptor.ptr<float>(), descriptor.ptr<float>() + descriptor.cols);
+  archive(values);
+  if constexpr (Archive::kReading) {
+    descriptor = values.empty() ? cv::Mat() : cv::Mat(values, true).reshape(1, 1);
+    if (!descriptor.empty() &&
+        (!cv::checkRange(descriptor) || !(std::abs(cv::norm(descriptor) - 1.0) < 1e-3)))
+      archive.Damaged("a descriptor that is not of length 1");
+  }
+}
 
 }  // namespace tutti

@@ -5,7 +5,8 @@
 #include <tuple>
 #include <utility>
 
-#include "core/byte_stream.h"
+#include "core/index.h"
+#include "core/state_archive.h"
 #include "loopclosure/memory/dense_model.h"
 
 namespace tutti {
@@ -17,7 +18,7 @@ void LikelihoodModel::Add(const Signature& signature) {
 }
 
 void LikelihoodModel::Restore(int slot, const Signature& signature) {
-  const std::size_t index = static_cast<std::size_t>(slot);
+  const std::size_t index = internal::Index(slot);
   if (present_[index]) return;
   present_[index] = true;
   ++locations_;
@@ -35,7 +36,7 @@ void LikelihoodModel::Insert(int slot) {
 }
 
 void LikelihoodModel::Remove(int slot) {
-  const std::size_t index = static_cast<std::size_t>(slot);
+  const std::size_t index = internal::Index(slot);
   if (!present_[index]) return;
   present_[index] = false;
   --locations_;
@@ -56,14 +57,14 @@ std::vector<double> LikelihoodModel::Scores(const Signature& query) const {
     const std::vector<Posting>& list = *found;
     if (kind_ == LikelihoodKind::kSimilarity) {
       for (const Posting& posting : list) {
-        scores[static_cast<std::size_t>(posting.slot)] += std::min(posting.count, entry.count);
+        scores[internal::Index(posting.slot)] += std::min(posting.count, entry.count);
       }
       continue;
     }
     const double inverse_frequency =
         std::log10(static_cast<double>(locations_) / static_cast<double>(list.size()));
     for (const Posting& posting : list) {
-      const std::size_t slot = static_cast<std::size_t>(posting.slot);
+      const std::size_t slot = internal::Index(posting.slot);
       scores[slot] += static_cast<double>(posting.count) / signatures_[slot].size() * inverse_frequency;
     }
   }
@@ -146,7 +147,7 @@ std::vector<double> LikelihoodModel::Counts(const SeenWords& query, const Sight&
                            (all * static_cast<double>(same.second - same.first));
       if (value > 0.0) {
         sight.ForEachReturn(*list, size() - 1, [&](const Posting& posting) {
-          in_cell.Add(static_cast<std::size_t>(posting.slot), posting.count * value);
+          in_cell.Add(internal::Index(posting.slot), posting.count * value);
         });
       }
     }
@@ -162,26 +163,26 @@ std::vector<double> LikelihoodModel::Counts(const SeenWords& query, const Sight&
   return counts;
 }
 
-void LikelihoodModel::Save(internal::ByteWriter& out) const {
-  out.Put<std::uint64_t>(signatures_.size());
-  for (std::size_t i = 0; i < signatures_.size(); ++i) {
-    out.Put<char>(present_[i] ? 1 : 0);
-    signatures_[i].Save(out);
+template <class Archive>
+void LikelihoodModel::State(Archive& archive) {
+  std::uint64_t count = signatures_.size();
+  archive(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if constexpr (Archive::kReading) signatures_.emplace_back();
+    bool present = !Archive::kReading && present_[i];
+    archive(present, signatures_[i]);
+    if constexpr (Archive::kReading) {
+      present_.push_back(present);
+      if (!present && !signatures_[i].empty()) archive.Damaged("words of a location that is not in memory");
+      if (!present) continue;
+      ++locations_;
+      Insert(static_cast<int>(i));
+    }
   }
 }
 
-void LikelihoodModel::Load(internal::ByteReader& in) {
-  const std::size_t count = in.GetCount(2);
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool present = in.Get<char>() != 0;
-    signatures_.push_back(Signature::Load(in));
-    present_.push_back(present);
-    if (!present && !signatures_.back().empty()) in.Damaged("words of a location that is not in memory");
-    if (!present) continue;
-    ++locations_;
-    Insert(static_cast<int>(i));
-  }
-}
+template void LikelihoodModel::State(internal::StateWriter& archive);
+template void LikelihoodModel::State(internal::StateReader& archive);
 
 Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int>& working_memory) {
   Belief likelihood;
@@ -189,7 +190,7 @@ Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int
   double sum = 0.0;
   int count = 0;
   for (const int slot : working_memory) {
-    const double score = scores[static_cast<std::size_t>(slot)];
+    const double score = scores[internal::Index(slot)];
     if (score > 0.0) {
       sum += score;
       ++count;
@@ -198,14 +199,14 @@ Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int
   const double mean = count > 0 ? sum / count : 0.0;
   double squares = 0.0;
   for (const int slot : working_memory) {
-    const double score = scores[static_cast<std::size_t>(slot)];
+    const double score = scores[internal::Index(slot)];
     if (score > 0.0) squares += (score - mean) * (score - mean);
   }
   const double sigma = count > 1 ? std::sqrt(squares / (count - 1)) : 0.0;
 
   bool stands_out = false;
   for (const int slot : working_memory) {
-    const std::size_t i = static_cast<std::size_t>(slot);
+    const std::size_t i = internal::Index(slot);
     likelihood.places[i] = 1.0;
     if (scores[i] > 0.0 && scores[i] > mean + sigma) {
       likelihood.places[i] = (scores[i] - (sigma - 1e-4)) / mean;

@@ -4,17 +4,13 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "core/index.h"
 #include "loopclosure/memory/belief.h"
 #include "loopclosure/vocabulary/signature.h"
 #include "loopclosure/vocabulary/word_map.h"
 #include "tutti/loopclosure/detector_options.h"
 
 namespace tutti {
-
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
 
 /// What a member sees in an image: its words and where they were seen, the cell of each feature in a grid of
 /// kColumns cells along the longer side of the image; or, a dense member, its descriptor.
@@ -29,7 +25,7 @@ struct SeenWords {
   static int Cell(const cv::Point2f& pixel, const cv::Size& size);
   /// Number of words that are known.
   int size() const;
-  /// The same, with a number that stands for a descriptor.
+  /// size(), with a number that stands for a descriptor.
   double Amount() const;
 };
 
@@ -74,7 +70,7 @@ class LikelihoodModel {
   /// Puts a slot's words in again (retrieved from long-term memory).
   void Restore(int slot, const Signature& signature);
   /// Signature of a slot; empty for a bad one and for one that is not in the index.
-  const Signature& signature(int slot) const { return signatures_[static_cast<std::size_t>(slot)]; }
+  const Signature& signature(int slot) const { return signatures_[internal::Index(slot)]; }
 
   /// Raw scores s_i of every slot (0 where nothing is shared). Section 2, both variants:
   /// similarity: s_i = (sum over shared words of min(multiplicity)) / max(|z_t|, |z_i|);
@@ -93,16 +89,14 @@ class LikelihoodModel {
   std::vector<double> Counts(const SeenWords& query, const Sight& sight = {}) const;
 
   /// True if a slot is in the index, be it with a bad signature.
-  bool Has(int slot) const { return present_[static_cast<std::size_t>(slot)]; }
+  bool Has(int slot) const { return present_[internal::Index(slot)]; }
   /// Slots ever added.
   int size() const { return static_cast<int>(signatures_.size()); }
   /// Locations in the index, bad signatures included: N.
   int NumLocations() const { return locations_; }
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object of the same kind. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   void Insert(int slot);

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 
 namespace tutti {
 
@@ -13,7 +13,7 @@ using internal::Index;
 
 int LocationMemory::Add(std::int64_t id) {
   const int slot = size();
-  nodes_.push_back({id, State::kShortTerm, 0, 0, {}});
+  nodes_.push_back({id, LocationState::kShortTerm, 0, 0, {}});
   changed_.insert(slot);
   slot_of_id_.emplace(id, slot);
   if (!short_term_.empty()) {
@@ -75,7 +75,7 @@ std::vector<int> LocationMemory::Settle(int most) {
 }
 
 void LocationMemory::Enter(int slot) {
-  nodes_[Index(slot)].state = State::kWorking;
+  nodes_[Index(slot)].state = LocationState::kWorking;
   nodes_[Index(slot)].entered = entries_++;
   working_.insert(std::lower_bound(working_.begin(), working_.end(), slot), slot);
   changed_.insert(slot);
@@ -100,7 +100,7 @@ void LocationMemory::PassOn(int slot, int into, int weight) {
   nodes_[Index(into)].weight += weight;
   const std::vector<Link> passed_on = nodes_[Index(slot)].links;
   nodes_[Index(slot)].links.clear();
-  nodes_[Index(slot)].state = State::kMerged;
+  nodes_[Index(slot)].state = LocationState::kMerged;
   changed_.insert({slot, into});
   for (const Link& link : passed_on) {
     std::vector<Link>& back = nodes_[Index(link.slot)].links;
@@ -113,16 +113,18 @@ void LocationMemory::PassOn(int slot, int into, int weight) {
 }
 
 bool LocationMemory::CanMerge(int slot, int into) const {
-  return into >= 0 && into < slot && state(into) != State::kMerged && state(slot) != State::kMerged &&
-         !(state(slot) == State::kShortTerm && slot == short_term_.back());
+  return into >= 0 && into < slot && state(into) != LocationState::kMerged &&
+         state(slot) != LocationState::kMerged &&
+         !(state(slot) == LocationState::kShortTerm && slot == short_term_.back());
 }
 
 void LocationMemory::Merge(int slot, int into) {
-  const State was = state(slot);
-  if (was == State::kShortTerm)
+  const LocationState was = state(slot);
+  if (was == LocationState::kShortTerm)
     short_term_.erase(std::lower_bound(short_term_.begin(), short_term_.end(), slot));
-  if (was == State::kWorking) working_.erase(std::lower_bound(working_.begin(), working_.end(), slot));
-  if (was == State::kLongTerm) --num_long_term_;
+  if (was == LocationState::kWorking)
+    working_.erase(std::lower_bound(working_.begin(), working_.end(), slot));
+  if (was == LocationState::kLongTerm) --num_long_term_;
   PassOn(slot, into, 1 + nodes_[Index(slot)].weight);
   nodes_[Index(slot)].weight = 0;
   // Those that were merged into it before are newer.
@@ -154,16 +156,17 @@ int LocationMemory::NextToTransfer(double recent_share, const std::set<int>& imm
     if (nodes_[Index(slot)].entered >= newest_allowed || immune.count(slot) > 0) continue;
     if (next >= 0 && key(next) < key(slot)) continue;
     const std::vector<Link>& near = links(slot);
-    const bool in_use = std::any_of(
-        near.begin(), near.end(), [this](const Link& link) { return state(link.slot) == State::kShortTerm; });
+    const bool in_use = std::any_of(near.begin(), near.end(), [this](const Link& link) {
+      return state(link.slot) == LocationState::kShortTerm;
+    });
     if (!in_use) next = slot;
   }
   return next;
 }
 
 bool LocationMemory::Transfer(int slot) {
-  if (state(slot) != State::kWorking) return false;
-  nodes_[Index(slot)].state = State::kLongTerm;
+  if (state(slot) != LocationState::kWorking) return false;
+  nodes_[Index(slot)].state = LocationState::kLongTerm;
   working_.erase(std::lower_bound(working_.begin(), working_.end(), slot));
   ++num_long_term_;
   changed_.insert(slot);
@@ -171,7 +174,7 @@ bool LocationMemory::Transfer(int slot) {
 }
 
 bool LocationMemory::Retrieve(int slot) {
-  if (state(slot) != State::kLongTerm) return false;
+  if (state(slot) != LocationState::kLongTerm) return false;
   --num_long_term_;
   Enter(slot);
   return true;
@@ -179,9 +182,9 @@ bool LocationMemory::Retrieve(int slot) {
 
 std::vector<int> LocationMemory::LongTermNeighbours(int slot, int levels, int count) const {
   std::vector<int> found;
-  for (const auto& [near, level, loops] : Walk(slot, levels, [](State) { return true; })) {
+  for (const auto& [near, level, loops] : Walk(slot, levels, [](LocationState) { return true; })) {
     if (static_cast<int>(found.size()) == count) break;
-    if (state(near) == State::kLongTerm) found.push_back(near);
+    if (state(near) == LocationState::kLongTerm) found.push_back(near);
   }
   return found;
 }
@@ -204,7 +207,14 @@ int LocationMemory::Find(std::int64_t id) const {
 }
 
 std::vector<LocationMemory::Neighbour> LocationMemory::Neighbours(int slot, int levels) const {
-  return Walk(slot, levels, [](State state) { return state == State::kWorking; });
+  return Walk(slot, levels, [](LocationState state) { return state == LocationState::kWorking; });
+}
+
+std::vector<int> LocationMemory::SlotsNear(int slot, int levels) const {
+  std::vector<int> slots;
+  for (const Neighbour& near : Neighbours(slot, levels)) slots.push_back(near.slot);
+  std::sort(slots.begin(), slots.end());
+  return slots;
 }
 
 template <typename Walkable>
@@ -244,49 +254,30 @@ std::vector<LocationMemory::Neighbour> LocationMemory::Walk(int slot, int levels
   return found;
 }
 
-void LocationMemory::SaveSlot(int slot, internal::ByteWriter& out) const {
-  const Node& node = nodes_[Index(slot)];
-  out.Put(node.id);
-  out.Put(node.state);
-  out.Put<std::int32_t>(node.weight);
-  out.Put(node.entered);
-  out.Put<std::int32_t>(Find(node.id));  // of a merged location: which one it was merged into
-  out.Put<std::uint64_t>(node.links.size());
-  for (const Link& link : node.links) {
-    out.Put<std::int32_t>(link.slot);
-    out.Put(static_cast<std::uint8_t>(link.type));
+template <class Archive>
+void LocationMemory::StateOfSlot(int slot, Archive& archive) {
+  if constexpr (Archive::kReading) nodes_.emplace_back();
+  Node& node = nodes_[Index(slot)];
+  int names = Archive::kReading ? 0 : Find(node.id);  // of a merged location: which one it was merged into
+  archive(node.id, node.state, node.weight, node.entered, names, node.links);
+  if constexpr (Archive::kReading) {
+    if (node.state > LocationState::kLongTerm) archive.Damaged("a location in an unknown state");
+    for (const Link& link : node.links) {
+      if (link.type > LinkType::kMoreLoop) archive.Damaged("a link of an unknown type");
+    }
+    // One that was merged names the location that it was merged into, any other itself.
+    const bool merged = node.state == LocationState::kMerged;
+    if (names < 0 || names > slot || merged != (names < slot) ||
+        (merged && state(names) == LocationState::kMerged)) {
+      archive.Damaged("a location merged into one that is not there");
+    }
+    if (node.id < 0 || (slot > 0 && node.id <= id(slot - 1))) archive.Damaged("locations out of order");
+    constexpr std::int64_t kMostEntries = std::int64_t{1} << 62;
+    if (node.weight < 0 || node.entered < 0 || node.entered > kMostEntries) {
+      archive.Damaged("a location with an impossible weight or age");
+    }
+    slot_of_id_.emplace(node.id, names);
   }
-}
-
-void LocationMemory::LoadSlot(internal::ByteReader& in) {
-  Node node;
-  node.id = in.Get<std::int64_t>();
-  const auto state = in.Get<std::uint8_t>();
-  if (state > static_cast<std::uint8_t>(State::kLongTerm)) in.Damaged("a location in an unknown state");
-  node.state = static_cast<State>(state);
-  node.weight = in.Get<std::int32_t>();
-  node.entered = in.Get<std::int64_t>();
-  const int names = in.Get<std::int32_t>();
-  const std::size_t count = in.GetCount(sizeof(std::int32_t) + 1);
-  for (std::size_t i = 0; i < count; ++i) {
-    const int to = in.Get<std::int32_t>();
-    const auto type = in.Get<std::uint8_t>();
-    if (type > static_cast<std::uint8_t>(LinkType::kMoreLoop)) in.Damaged("a link of an unknown type");
-    node.links.push_back({to, static_cast<LinkType>(type)});
-  }
-  // One that was merged names the location that it was merged into, any other itself.
-  const bool merged = node.state == State::kMerged;
-  if (names < 0 || names > size() || merged != (names < size()) ||
-      (merged && nodes_[Index(names)].state == State::kMerged)) {
-    in.Damaged("a location merged into one that is not there");
-  }
-  if (node.id < 0 || (!nodes_.empty() && node.id <= nodes_.back().id)) in.Damaged("locations out of order");
-  constexpr std::int64_t kMostEntries = std::int64_t{1} << 62;
-  if (node.weight < 0 || node.entered < 0 || node.entered > kMostEntries) {
-    in.Damaged("a location with an impossible weight or age");
-  }
-  slot_of_id_.emplace(node.id, names);
-  nodes_.push_back(std::move(node));
 }
 
 void LocationMemory::FinishLoading() {
@@ -303,31 +294,35 @@ void LocationMemory::FinishLoading() {
                                     }),
                      node.links.end());
     entries_ = std::max(entries_, node.entered + 1);
-    if (node.state == State::kShortTerm) short_term_.push_back(slot);
-    if (node.state == State::kWorking) working_.push_back(slot);
-    if (node.state == State::kLongTerm) ++num_long_term_;
+    if (node.state == LocationState::kShortTerm) short_term_.push_back(slot);
+    if (node.state == LocationState::kWorking) working_.push_back(slot);
+    if (node.state == LocationState::kLongTerm) ++num_long_term_;
   }
   changed_.clear();
 }
 
-void LocationMemory::Save(internal::ByteWriter& out) const {
-  out.Put<std::int32_t>(size());
-  for (int slot = 0; slot < size(); ++slot) SaveSlot(slot, out);
-}
-
-void LocationMemory::Load(internal::ByteReader& in) {
-  const int count = in.Get<std::int32_t>();
-  for (int slot = 0; slot < count; ++slot) LoadSlot(in);
-  FinishLoading();
-  // A weight counts the locations that were merged into one, so all together are no more than there are.
-  std::int64_t weights = 0;
-  for (const Node& node : nodes_) weights += node.weight;
-  if (weights > size()) in.Damaged("locations with impossible weights");
-  int newest = size() - 1;
-  while (newest >= 0 && state(newest) == State::kMerged) --newest;
-  if (newest >= 0 && !short_term_.empty() && state(newest) != State::kShortTerm) {
-    in.Damaged("the newest location is not in short-term memory");
+template <class Archive>
+void LocationMemory::State(Archive& archive) {
+  int count = size();
+  archive(count);
+  for (int slot = 0; slot < count; ++slot) StateOfSlot(slot, archive);
+  if constexpr (Archive::kReading) {
+    FinishLoading();
+    // A weight counts the locations that were merged into one, so all together are no more than there are.
+    std::int64_t weights = 0;
+    for (const Node& node : nodes_) weights += node.weight;
+    if (weights > size()) archive.Damaged("locations with impossible weights");
+    int newest = size() - 1;
+    while (newest >= 0 && state(newest) == LocationState::kMerged) --newest;
+    if (newest >= 0 && !short_term_.empty() && state(newest) != LocationState::kShortTerm) {
+      archive.Damaged("the newest location is not in short-term memory");
+    }
   }
 }
+
+template void LocationMemory::StateOfSlot(int slot, internal::StateWriter& archive);
+template void LocationMemory::StateOfSlot(int slot, internal::StateReader& archive);
+template void LocationMemory::State(internal::StateWriter& archive);
+template void LocationMemory::State(internal::StateReader& archive);
 
 }  // namespace tutti

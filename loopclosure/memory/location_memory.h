@@ -6,17 +6,19 @@
 #include <deque>
 #include <map>
 #include <set>
-#include <utility>
 #include <vector>
 
 #include "core/index.h"
 
 namespace tutti {
 
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
+/// Where a location is.
+enum class LocationState : std::uint8_t {
+  kShortTerm,  ///< in STM: no candidate yet
+  kWorking,    ///< in WM: a candidate
+  kMerged,     ///< nowhere: it was merged into an older one, which its id names from then on
+  kLongTerm,   ///< in LTM: left WM, can be retrieved
+};
 
 /// Short-term memory (STM, a FIFO of the newest locations, which are no candidates) and working memory (WM,
 /// the candidates), after Labbe & Michaud 2013, section III. Shared between the members (loop-closure.md
@@ -27,15 +29,8 @@ class ByteWriter;
 /// Locations are slots 0, 1, 2, ... in the order of adding; the caller's ids are kept beside them.
 class LocationMemory {
  public:
-  /// Where a location is.
-  enum class State : std::uint8_t {
-    kShortTerm,  ///< in STM: no candidate yet
-    kWorking,    ///< in WM: a candidate
-    kMerged,     ///< nowhere: it was merged into an older one, which its id names from then on
-    kLongTerm,   ///< in LTM: left WM, can be retrieved
-  };
   /// How two locations are linked.
-  enum class LinkType {
+  enum class LinkType : std::uint8_t {
     kOdometry,  ///< neighbours in time, one graph level apart
     kLoop,      ///< the same place, zero levels apart
     kMoreLoop,  ///< the same place, but one of them has kMostLoops already: known, and not walked
@@ -44,6 +39,11 @@ class LocationMemory {
   struct Link {
     int slot = 0;                         ///< the other location
     LinkType type = LinkType::kOdometry;  ///< how they are linked
+
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(slot, type);
+    }
   };
 
   /// Loop links of one location that are walked. With kMostLoopsOfAWalk it keeps the neighbourhood of a place
@@ -77,7 +77,7 @@ class LocationMemory {
   bool RemoveLoop(int a, int b);
   /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
   std::vector<int> Settle() { return Settle(stm_size_); }
-  /// The same while |STM| > `most`; 0: another recording begins, and nothing is too recent for it.
+  /// Does so while |STM| > `most`; 0: another recording begins, and nothing is too recent for it.
   std::vector<int> Settle(int most);
   /// Rehearsal (section 6): the newest location is merged into the one before it, weight_old += 1 +
   /// weight_new, and dropped; its id names the older one from now on. Returns the older slot, -1 if STM holds
@@ -111,25 +111,26 @@ class LocationMemory {
   /// Slots whose state, weight or links changed since the last call, ascending.
   std::vector<int> TakeChanged();
 
-  /// Appends one slot's record (id, state, weight, links), for the long-term memory's file.
-  void SaveSlot(int slot, internal::ByteWriter& out) const;
-  /// Takes up the record of slot size(): call for all of them, slots ascending, then FinishLoading. Throws
-  /// InputError for a record that can't be one.
-  void LoadSlot(internal::ByteReader& in);
+  /// The record of one slot (id, state, weight, links), for the long-term memory's file. Slots are read in
+  /// ascending order, each when size() is its number; then FinishLoading.
+  template <class Archive>
+  void StateOfSlot(int slot, Archive& archive);
   /// Makes a memory of the records: those that were in STM or WM are there again. Links to slots that were
   /// never loaded are dropped.
   void FinishLoading();
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object of the same options. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
   /// Slots in WM, ascending: the candidates.
   const std::vector<int>& working_memory() const { return working_; }
   /// Slots in STM, ascending; the newest location last.
   const std::deque<int>& short_term_memory() const { return short_term_; }
   /// Where a slot is. This and the next three: `slot` in 0 .. size() - 1.
-  State state(int slot) const { return nodes_[internal::Index(slot)].state; }
+  LocationState state(int slot) const { return nodes_[internal::Index(slot)].state; }
+  /// True for a slot in STM or WM: what it looks like is in memory.
+  bool Holds(int slot) const {
+    return state(slot) == LocationState::kShortTerm || state(slot) == LocationState::kWorking;
+  }
   /// A slot's links to others, in the order in which they were added.
   const std::vector<Link>& links(int slot) const { return nodes_[internal::Index(slot)].links; }
   /// How often a place was seen: the locations that rehearsal or a loop merged into it.
@@ -145,11 +146,13 @@ class LocationMemory {
   /// level, then slot. Odometry links count 1, loop links 0, of which a walk takes kMostLoopsOfAWalk. Only WM
   /// is walked.
   std::vector<Neighbour> Neighbours(int slot, int levels) const;
+  /// The slots of Neighbours, ascending.
+  std::vector<int> SlotsNear(int slot, int levels) const;
 
  private:
   struct Node {
     std::int64_t id = 0;
-    State state = State::kShortTerm;
+    LocationState state = LocationState::kShortTerm;
     int weight = 0;
     std::int64_t entered = 0;  // WM, by the count of all entries
     std::vector<Link> links;

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/byte_stream.h"
-#include "loopclosure/features/dnn_descriptor.h"
-#include "loopclosure/features/gradient_descriptor.h"
+#include "core/state_archive.h"
+#include "loopclosure/features/whole_image.h"
 
 namespace tutti {
 
@@ -48,25 +47,25 @@ bool Member::Judge(const Features& features) {
   return count >= 2 && count >= bad_signature_ratio_ * mean;
 }
 
-void Member::SaveStatistics(internal::ByteWriter& out) const {
-  out.Put(feature_sum_);
-  out.Put<std::int32_t>(images_);
-  if (dense_) out.Put<std::int32_t>(width_);
-  out.Put<std::int32_t>(vocabulary_.created());
+template <class Archive>
+void Member::State(Archive& archive) {
+  int created = vocabulary_.created();
+  archive(feature_sum_, images_);
+  if (dense_) archive(width_);
+  archive(created);
+  if constexpr (Archive::kReading) {
+    if (network_ && width_ != network_->width())
+      archive.Damaged("descriptors of another length than the network's");
+    constexpr int kMostImages = 1 << 30;
+    if (width_ < 0 || !(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 ||
+        images_ > kMostImages || created < 0 || created > Vocabulary::kMostWords) {
+      archive.Damaged("a member's statistics");
+    }
+    vocabulary_.SkipIds(created);
+  }
 }
 
-void Member::LoadStatistics(internal::ByteReader& in) {
-  feature_sum_ = in.Get<double>();
-  images_ = in.Get<std::int32_t>();
-  if (dense_) width_ = in.Get<std::int32_t>();
-  if (network_ && width_ != network_->width()) in.Damaged("descriptors of another length than the network's");
-  const int created = in.Get<std::int32_t>();
-  constexpr int kMostImages = 1 << 30;
-  if (width_ < 0 || !(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 ||
-      images_ > kMostImages || created < 0 || created > Vocabulary::kMostWords) {
-    in.Damaged("a member's statistics");
-  }
-  vocabulary_.SkipIds(created);
-}
+template void Member::State(internal::StateWriter& archive);
+template void Member::State(internal::StateReader& archive);
 
 }  // namespace tutti

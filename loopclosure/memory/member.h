@@ -18,10 +18,9 @@ class DnnDescriptor;
 class Member {
  public:
   /// `name`: of options.members; `seed`: of its vocabulary's index. Throws InputError for
-  /// another name, and for a network of the member dnn that can't be used (dnn_descriptor.h).
+  /// another name, and for a network of the member dnn that can't be used (whole_image.h).
   Member(const std::string& name, const LoopDetectorOptions& options, std::uint64_t seed);
 
-  /// As given.
   const std::string& name() const { return name_; }
 
   /// Step 1: features of an image: `grey` is what ToGrey8 makes of it. Where `mask` (CV_8UC1, or empty) is 0
@@ -43,17 +42,16 @@ class Member {
   /// bad_signature_ratio x their running mean, or fewer than two), which gets no words: the member sits this
   /// image out. Once per image: keeps the mean.
   bool Judge(const Features& features);
-  /// Of its vocabulary; 0 for a dense member.
+  /// Words of its vocabulary; 0 for a dense member.
   int num_words() const { return vocabulary_.size(); }
   /// Its vocabulary, for the memory: words leave and return with locations.
   Vocabulary& vocabulary() { return vocabulary_; }
   /// Its vocabulary.
   const Vocabulary& vocabulary() const { return vocabulary_; }
 
-  /// Appends its running figures: all of the state but the vocabulary.
-  void SaveStatistics(internal::ByteWriter& out) const;
-  /// Takes up what SaveStatistics wrote. Throws InputError if it is damaged.
-  void LoadStatistics(internal::ByteReader& in);
+  /// Its running figures: all but the vocabulary, which only learns which ids are taken.
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   std::string name_;

@@ -6,13 +6,14 @@
 #include <system_error>
 
 #include "core/byte_stream.h"
+#include "core/index.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
 namespace {
 
 constexpr int kApplicationId = 0x74757474;  // "tutt": what SQLite's header says of whose file it is
-constexpr int kSchemaVersion = 4;
+constexpr int kSchemaVersion = 5;
 
 // Runs one prepared statement and leaves it ready for the next time, whatever happens.
 class Use {
@@ -35,7 +36,7 @@ class Use {
     const void* data = sqlite3_column_blob(statement_, column);
     const int size = sqlite3_column_bytes(statement_, column);
     return data == nullptr ? std::string_view()
-                           : std::string_view(static_cast<const char*>(data), static_cast<std::size_t>(size));
+                           : std::string_view(static_cast<const char*>(data), Index(size));
   }
 
  private:
@@ -139,6 +140,21 @@ void LocationStore::Rollback() noexcept {
   }
 }
 
+void LocationStore::InOneStep(const std::function<void()>& puts) {
+  try {
+    Begin();
+    puts();
+    Commit();
+  } catch (...) {
+    Rollback();
+    throw;
+  }
+}
+
+void LocationStore::Damaged(const std::string& what) const {
+  throw InputError(name_ + ": is damaged (" + what + "); give another file, or an older copy");
+}
+
 void LocationStore::Put(Kind kind, std::int64_t a, std::int64_t b, std::string_view bytes) {
   Use use(statements_->put);
   use.Bind(1, static_cast<std::int64_t>(kind));
@@ -194,7 +210,7 @@ void LocationStore::Fail(int code, const std::string& doing) const {
     case SQLITE_NOTADB:
       throw InputError(name_ + ": is no long-term memory (not an SQLite database); give another file");
     case SQLITE_CORRUPT:
-      throw InputError(name_ + ": is damaged (" + cause + "); give another file, or an older copy");
+      Damaged(cause);
     case SQLITE_FULL:
       throw InputError(name_ + ": the disk is full; make room, what was stored so far is safe");
     case SQLITE_READONLY:
@@ -207,10 +223,7 @@ void LocationStore::Fail(int code, const std::string& doing) const {
 }
 
 std::string LocationStore::Checked(std::int64_t crc, std::string_view bytes) const {
-  if (static_cast<std::int64_t>(Crc32(bytes)) != crc) {
-    throw InputError(name_ +
-                     ": is damaged (a record's checksum is wrong); give another file, or an older copy");
-  }
+  if (static_cast<std::int64_t>(Crc32(bytes)) != crc) Damaged("a record's checksum is wrong");
   return std::string(bytes);
 }
 

@@ -44,6 +44,10 @@ class LocationStore {
   void Commit();
   /// Takes back everything since Begin; never throws.
   void Rollback() noexcept;
+  /// All that `puts` does as one step. Throws what it throws: then nothing is stored.
+  void InOneStep(const std::function<void()>& puts);
+  /// Throws InputError: the file is damaged, for `what`.
+  [[noreturn]] void Damaged(const std::string& what) const;
 
   /// Stores a record, in place of an older one.
   void Put(Kind kind, std::int64_t a, std::int64_t b, std::string_view bytes);
@@ -51,7 +55,7 @@ class LocationStore {
   std::optional<std::string> Get(Kind kind, std::int64_t a, std::int64_t b);
   /// Calls for every record of a kind, ascending (a, b).
   void ForEach(Kind kind, const std::function<void(std::int64_t, std::int64_t, std::string_view)>& call);
-  /// As if the disk were full at this many pages (of 4 KiB, as a rule).
+  /// Makes the store behave as if the disk were full at this many pages (of 4 KiB, as a rule).
   void LimitPages(int pages);
   /// Removes all records.
   void Clear();

@@ -6,7 +6,8 @@
 #include <cstring>
 #include <vector>
 
-#include "loopclosure/store/signed_squares.h"
+#include "core/index.h"
+#include "core/state_archive.h"
 
 namespace tutti::internal {
 namespace {
@@ -29,7 +30,7 @@ struct PackedMat::Code {
   int (*byte_of)(float);  // of a float that is one of them; of others any
   std::array<float, 256> values;
 
-  // Of a row; false if a value is none of them.
+  // Packs a row; false if a value is none of them.
   bool Pack(const float* from, int count, std::uint8_t* to) const {
     bool all = true;
     for (int i = 0; i < count; ++i) {
@@ -57,8 +58,8 @@ const std::array<PackedMat::Code, 2>& PackedMat::Codes() {
   static const std::array<Code, 2> codes = [&] {
     std::array<Code, 2> made = {Code{Kind::kWholeAsBytes, whole, {}}, Code{Kind::kSquaresAsBytes, root, {}}};
     for (int i = 0; i < 256; ++i) {
-      made[0].values[static_cast<std::size_t>(i)] = static_cast<float>(i);
-      made[1].values[static_cast<std::size_t>(i)] = SignedSquare(i < 128 ? i : i - 256);
+      made[0].values[Index(i)] = static_cast<float>(i);
+      made[1].values[Index(i)] = SignedSquare(i < 128 ? i : i - 256);
     }
     return made;
   }();
@@ -88,67 +89,57 @@ cv::Mat PackedMat::Unpacked() const {
 
 void PackedMat::CopyRow(int row, std::uint8_t* to) const {
   if (code_ == nullptr) {
-    std::copy_n(values_.ptr(row), static_cast<std::size_t>(values_.cols) * values_.elemSize(), to);
+    std::copy_n(values_.ptr(row), Index(values_.cols) * values_.elemSize(), to);
   } else {
     code_->Unpack(values_.ptr(row), values_.cols, reinterpret_cast<float*>(to));
   }
 }
 
-void PackedMat::Put(ByteWriter& out) const {
-  if (empty()) return out.Put(Kind::kEmpty);
-  const bool floats = values_.type() == CV_32F;
-  out.Put(code_ != nullptr ? code_->kind : floats ? Kind::kFloatPlanes : Kind::kBytes);
-  out.Put<std::int32_t>(values_.rows);
-  out.Put<std::int32_t>(values_.cols);
-  const auto rows = static_cast<std::size_t>(values_.rows), columns = static_cast<std::size_t>(values_.cols);
-  if (floats) {
-    std::vector<float> values;
-    values.reserve(rows * columns);
-    ForEachColumn(values_.cols, [&](int c) {
-      for (int r = 0; r < values_.rows; ++r) values.push_back(values_.ptr<float>(r)[c]);
-    });
-    out.PutPlanes(values);
-  } else if (code_ != nullptr) {
-    const cv::Mat transposed = values_.t();
-    ForEachColumn(values_.cols, [&](int c) { out.PutRaw(transposed.ptr(c), rows); });
+template <class Archive>
+void PackedMat::State(Archive& archive) {
+  Kind kind = Kind::kEmpty;
+  if (!empty()) kind = code_ != nullptr ? code_->kind : type() == CV_32F ? Kind::kFloatPlanes : Kind::kBytes;
+  archive(kind);
+  if (Archive::kReading) *this = PackedMat();
+  if (kind == Kind::kEmpty) return;
+  int rows = values_.rows, columns = values_.cols;
+  archive(rows, columns);
+  if constexpr (Archive::kReading) {
+    if (kind > Kind::kSquaresAsBytes) archive.Damaged("a matrix of an unknown kind");
+    if (rows <= 0 || columns <= 0) archive.Damaged("a matrix of an impossible size");
+    archive.Need(static_cast<std::uint64_t>(rows) * static_cast<std::uint64_t>(columns) *
+                 (kind == Kind::kFloatPlanes ? sizeof(float) : 1));
+    values_.create(rows, columns, kind == Kind::kFloatPlanes ? CV_32F : CV_8U);
+    for (const Code& code : Codes()) code_ = code.kind == kind ? &code : code_;
+  }
+  const auto height = Index(rows), width = Index(columns);
+  if (kind == Kind::kFloatPlanes) {
+    std::vector<float> values(Archive::kReading ? 0 : height * width);
+    auto element = values.begin();
+    if constexpr (!Archive::kReading) {
+      ForEachColumn(columns, [&](int c) {
+        for (int r = 0; r < rows; ++r) *element++ = values_.ptr<float>(r)[c];
+      });
+    }
+    archive(Planes{&values});
+    if constexpr (Archive::kReading) {
+      if (values.size() != height * width) archive.Damaged("a matrix of another size");
+      element = values.begin();
+      ForEachColumn(columns, [&](int c) {
+        for (int r = 0; r < rows; ++r) values_.ptr<float>(r)[c] = *element++;
+      });
+    }
+  } else if (code_ == nullptr) {
+    for (int r = 0; r < rows; ++r) archive.Raw(values_.ptr(r), width);
   } else {
-    for (int r = 0; r < values_.rows; ++r) out.PutRaw(values_.ptr(r), columns);
+    cv::Mat transposed(columns, rows, CV_8U);
+    if (!Archive::kReading) cv::transpose(values_, transposed);
+    ForEachColumn(columns, [&](int c) { archive.Raw(transposed.ptr(c), height); });
+    if (Archive::kReading) cv::transpose(transposed, values_);
   }
 }
 
-PackedMat PackedMat::Get(ByteReader& in) {
-  const auto kind = static_cast<Kind>(in.Get<std::uint8_t>());
-  if (kind == Kind::kEmpty) return {};
-  if (kind > Kind::kSquaresAsBytes) in.Damaged("a matrix of an unknown kind");
-  const auto rows = in.Get<std::int32_t>();
-  const auto columns = in.Get<std::int32_t>();
-  const bool planes = kind == Kind::kFloatPlanes;
-  const std::size_t width = planes ? sizeof(float) : 1;
-  if (rows <= 0 || columns <= 0 ||
-      static_cast<std::uint64_t>(rows) * static_cast<std::uint64_t>(columns) > in.Left() / width) {
-    in.Damaged("a matrix of an impossible size");
-  }
-  PackedMat packed;
-  const auto height = static_cast<std::size_t>(rows);
-  if (planes) {
-    const std::vector<float> values = in.GetPlanes();
-    packed.values_.create(rows, columns, CV_32F);
-    if (values.size() != packed.values_.total()) in.Damaged("a matrix of another size");
-    const float* next = values.data();
-    ForEachColumn(columns, [&](int c) {
-      for (int r = 0; r < rows; ++r) packed.values_.ptr<float>(r)[c] = *next++;
-    });
-  } else if (kind == Kind::kBytes) {
-    packed.values_.create(rows, columns, CV_8U);
-    in.GetRaw(packed.values_.data, packed.values_.total());
-  } else {
-    cv::Mat transposed(columns, rows, CV_8U);
-    ForEachColumn(columns, [&](int c) { in.GetRaw(transposed.ptr(c), height); });
-    packed.values_ = transposed.t();
-    packed.code_ =
-        std::find_if(Codes().begin(), Codes().end(), [&](const Code& code) { return code.kind == kind; });
-  }
-  return packed;
-}
+template void PackedMat::State(StateWriter& archive);
+template void PackedMat::State(StateReader& archive);
 
 }  // namespace tutti::internal

@@ -1,13 +1,25 @@
 // Matrices of descriptors in as few bytes as may be, in memory and in files.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <opencv2/core.hpp>
 
-#include "core/byte_stream.h"
-
 namespace tutti::internal {
+
+// Signed squares: numbers of -1 to 1 of which each fits a byte, finest next to 0, where most of a
+// descriptor's are.
+
+inline constexpr int kMostRoot = 127;  ///< of a signed square: the next, 128, would be 1
+
+/// The root of the signed square that is nearest by its root: -kMostRoot .. kMostRoot. `value` is a number.
+inline int SignedRoot(float value) {
+  const int root = static_cast<int>(std::lround(std::sqrt(std::min(std::abs(value), 1.0f)) * 128));
+  return std::copysign(1.0f, value) < 0 ? -std::min(root, kMostRoot) : std::min(root, kMostRoot);
+}
+inline float SignedSquare(int root) { return static_cast<float>(root * std::abs(root)) / (128 * 128); }
 
 /// A matrix of CV_8U or CV_32F, without loss. CV_32F takes a byte a value where all are whole numbers 0..255
 /// (SIFT) or signed squares (SURF). Copies share what they hold, as those of cv::Mat do.
@@ -27,10 +39,9 @@ class PackedMat {
   int cols() const { return values_.cols; }
   int type() const { return code_ != nullptr ? CV_32F : values_.type(); }
 
-  /// Appends the matrix, such that zstd makes less of it.
-  void Put(ByteWriter& out) const;
-  /// What Put wrote. Throws InputError where that is damaged.
-  static PackedMat Get(ByteReader& in);
+  /// Laid out such that zstd makes less of it.
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   enum class Kind : std::uint8_t { kEmpty, kBytes, kFloatPlanes, kWholeAsBytes, kSquaresAsBytes };

@@ -9,8 +9,8 @@
 #include <random>
 #include <vector>
 
+#include "core/index.h"
 #include "core/shuffle.h"
-#include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti::internal {
@@ -22,7 +22,7 @@ class BitTrie {
  public:
   static constexpr int kLeaf = 8;
 
-  BitTrie(int bytes, std::mt19937_64& generator) : order_(static_cast<std::size_t>(8 * bytes)) {
+  BitTrie(int bytes, std::mt19937_64& generator) : order_(Index(8 * bytes)) {
     std::iota(order_.begin(), order_.end(), 0);
     Shuffle(order_, generator);
     root_ = NewLeaf();
@@ -35,7 +35,7 @@ class BitTrie {
       if (IsLeaf(*at)) {
         Leaf& leaf = LeafAt(*at);
         if (leaf.count < kLeaf) {
-          leaf.rows[static_cast<std::size_t>(leaf.count++)] = row;
+          leaf.rows[Index(leaf.count++)] = row;
           return;
         }
         if (depth == order_.size()) {  // more than kLeaf equal descriptors
@@ -45,11 +45,11 @@ class BitTrie {
         }
         *at = Split(*at, depth, storage);
       }
-      at = &splits_[static_cast<std::size_t>(*at)][Bit(descriptor, depth)];
+      at = &splits_[Index(*at)][Bit(descriptor, depth)];
     }
   }
 
-  /// The same for many, into an empty trie.
+  /// Inserts many rows into an empty trie.
   void InsertAll(std::vector<int> rows, const WordStorage& storage) {
     free_leaves_.push_back(root_);
     root_ = Grow(rows.data(), rows.data() + rows.size(), 0, storage);
@@ -60,7 +60,7 @@ class BitTrie {
     const std::uint8_t* descriptor = storage.At(row);
     std::vector<int*> path = {&root_};
     while (!IsLeaf(*path.back())) {
-      path.push_back(&splits_[static_cast<std::size_t>(*path.back())][Bit(descriptor, path.size() - 1)]);
+      path.push_back(&splits_[Index(*path.back())][Bit(descriptor, path.size() - 1)]);
     }
     RemoveFromLeaf(*path.back(), row);
     path.pop_back();
@@ -89,7 +89,7 @@ class BitTrie {
           std::swap(walk, walks[--straight]);
           continue;
         }
-        const std::array<int, 2>& split = walk.trie->splits_[static_cast<std::size_t>(walk.at)];
+        const std::array<int, 2>& split = walk.trie->splits_[Index(walk.at)];
         const std::size_t bit = walk.trie->Bit(descriptor, walk.depth++);
         const Walk aside = {walk.trie, split[1 - bit], walk.depth};
         walk.at = split[bit];
@@ -108,8 +108,7 @@ class BitTrie {
           walks.pop_back();
           continue;
         }
-        walk.at =
-            walk.trie->splits_[static_cast<std::size_t>(walk.at)][walk.trie->Bit(descriptor, walk.depth++)];
+        walk.at = walk.trie->splits_[Index(walk.at)][walk.trie->Bit(descriptor, walk.depth++)];
         walk.trie->Prefetch(walk.at);
         ++i;
       }
@@ -123,8 +122,8 @@ class BitTrie {
     int count = 0;  // beyond kLeaf: the others are in overflow_
     std::array<int, kLeaf> rows{};
   };
-  Leaf& LeafAt(int link) { return leaves_[static_cast<std::size_t>(-1 - link)]; }
-  const Leaf& LeafAt(int link) const { return leaves_[static_cast<std::size_t>(-1 - link)]; }
+  Leaf& LeafAt(int link) { return leaves_[Index(-1 - link)]; }
+  const Leaf& LeafAt(int link) const { return leaves_[Index(-1 - link)]; }
 
   void Prefetch(int link) const {
     if (IsLeaf(link)) {
@@ -132,7 +131,7 @@ class BitTrie {
       __builtin_prefetch(&leaf);
       __builtin_prefetch(&leaf.rows.back());
     } else {
-      __builtin_prefetch(&splits_[static_cast<std::size_t>(link)]);
+      __builtin_prefetch(&splits_[Index(link)]);
     }
   }
 
@@ -178,7 +177,7 @@ class BitTrie {
     const int split = NewSplit();
     const int first = Grow(begin, middle, depth + 1, storage);
     const int second = Grow(middle, end, depth + 1, storage);
-    splits_[static_cast<std::size_t>(split)] = {first, second};
+    splits_[Index(split)] = {first, second};
     return split;
   }
 
@@ -189,16 +188,16 @@ class BitTrie {
     LeafAt(link).count = 0;
     for (const int row : full.rows) {
       Leaf& leaf = LeafAt(children[Bit(storage.At(row), depth)]);
-      leaf.rows[static_cast<std::size_t>(leaf.count++)] = row;
+      leaf.rows[Index(leaf.count++)] = row;
     }
     const int split = NewSplit();
-    splits_[static_cast<std::size_t>(split)] = children;
+    splits_[Index(split)] = children;
     return split;
   }
 
   // Makes one leaf of a split whose children are leaves that fit into one.
   bool Join(int& link) {
-    const std::array<int, 2> children = splits_[static_cast<std::size_t>(link)];
+    const std::array<int, 2> children = splits_[Index(link)];
     if (!IsLeaf(children[0]) || !IsLeaf(children[1])) return false;
     Leaf& kept = LeafAt(children[0]);
     const Leaf& other = LeafAt(children[1]);

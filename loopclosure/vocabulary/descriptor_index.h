@@ -10,9 +10,9 @@
 namespace tutti {
 
 namespace internal {
-class ByteReader;
-class ByteWriter;
 class PackedMat;
+class StateReader;
+class StateWriter;
 }  // namespace internal
 
 /// The two nearest words of a descriptor, by TRUE distance (Euclidean, not squared; or Hamming in bits).
@@ -40,14 +40,11 @@ class DescriptorIndex {
   virtual std::vector<TwoNearest> Search(const cv::Mat& descriptors) const = 0;
   /// A word's descriptor; nullptr if it is not in the index.
   virtual const std::uint8_t* Find(int word) const = 0;
-  /// Words in the index.
   virtual int size() const = 0;
-  /// Appends the whole state, such that a loaded index goes on as the saved one would. `known`: descriptors
-  /// that whoever loads it has, too (SaveWords).
-  virtual void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const = 0;
-  /// Takes up what Save wrote, into a new index of the same kind, width and seed. Throws InputError if it is
-  /// damaged.
-  virtual void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) = 0;
+  /// A loaded index goes on as the saved one would; it must be of the same kind, width and seed. `known`:
+  /// descriptors that whoever loads it has, too (WordStorage::State).
+  virtual void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) = 0;
+  virtual void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) = 0;
 };
 
 /// kd-forest over CV_32F descriptors (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves per
@@ -58,7 +55,7 @@ class DescriptorIndex {
 /// for the others.
 std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed);
 
-/// The same forest of FLANN's own KDTreeIndex: for comparison (docs/loop-closure.md, section 3). FLANN keeps
+/// Such a forest of FLANN's own KDTreeIndex: for comparison (docs/loop-closure.md, section 3). FLANN keeps
 /// every branch that a search passes, clears a bitset and reserves a heap of the size of the index for each
 /// tree and query, and can't let go of a removed word, so that all trees are grown anew once most of their
 /// words are gone.

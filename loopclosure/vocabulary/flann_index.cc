@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/byte_stream.h"
 #include "core/index.h"
 #include "core/shuffle.h"
+#include "core/state_archive.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
-#include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti {
@@ -48,12 +47,12 @@ class TopTwo : public flann::ResultSet<float> {
   TwoNearest nearest_;
 };
 
-class FlannIndex : public DescriptorIndex {
+class FlannIndex : public internal::StoredIndex<FlannIndex> {
  public:
   FlannIndex(int dimensions, int trees, int checks, std::uint64_t seed)
-      : dimensions_(Index(dimensions)),
-        checks_per_tree_(std::max(1, checks / trees)),
-        storage_(Index(dimensions) * sizeof(float)) {
+      : StoredIndex(Index(dimensions) * sizeof(float)),
+        dimensions_(Index(dimensions)),
+        checks_per_tree_(std::max(1, checks / trees)) {
     for (int t = 0; t < trees; ++t) trees_.push_back({nullptr, {}, internal::Shuffler(seed, t)});
   }
 
@@ -106,41 +105,29 @@ class FlannIndex : public DescriptorIndex {
 
   int size() const override { return size_; }
 
-  // Which row a word lies in changes no answer: rows are numbered anew, by word id.
-  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const override {
-    std::vector<int> rank(Index(storage_.end()), -1);
-    int next = 0;
-    internal::SaveWords(storage_, CV_32F, known, out);
-    storage_.ForEach([&](int, int row) {
-      out.Put<char>(alive_[Index(row)]);
-      rank[Index(row)] = next++;
-    });
-    for (const GrownTree& tree : trees_) {
-      tree.shuffler.Save(out);
-      std::vector<int> rows;
-      for (const int row : tree.rows) rows.push_back(rank[Index(row)]);
-      out.PutVector(rows);
-    }
-  }
-
-  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) override {
-    internal::LoadWords(storage_, CV_32F, known, in,
-                        [this](int word, const std::uint8_t* descriptor) { storage_.Add(word, descriptor); });
-    const std::size_t count = Index(storage_.size());
-    for (std::size_t i = 0; i < count; ++i) {
-      alive_.push_back(in.Get<char>() != 0 ? 1 : 0);
-      size_ += alive_.back();
+  template <class Archive>
+  void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
+    storage_.State(archive, CV_32F, known);
+    const std::vector<int> ranks = storage_.Ranks();
+    std::vector<char> alive;  // by rank
+    if constexpr (!Archive::kReading)
+      storage_.ForEach([&](int, int row) { alive.push_back(alive_[Index(row)]); });
+    archive(alive);
+    if constexpr (Archive::kReading) {
+      if (alive.size() != ranks.size()) archive.Damaged("words that may be there or not");
+      for (const char word : alive) alive_.push_back(word != 0 ? 1 : 0);
+      size_ = static_cast<int>(std::count(alive_.begin(), alive_.end(), 1));
     }
     for (GrownTree& tree : trees_) {
-      tree.shuffler.Load(in);
-      const std::vector<int> rows = in.GetVector<int>();
-      std::vector<char> seen(count, 0);
-      for (const int row : rows) {
-        if (row < 0 || Index(row) >= count || seen[Index(row)] != 0) in.Damaged("an impossible kd-tree");
-        seen[Index(row)] = 1;
-        InsertOne(row, tree);
+      std::vector<int> rows;
+      for (const int row : tree.rows) rows.push_back(ranks[Index(row)]);
+      archive(tree.shuffler, rows);
+      if constexpr (Archive::kReading) {
+        std::vector<int> sorted = rows;
+        std::sort(sorted.begin(), sorted.end());
+        if (sorted != ranks) archive.Damaged("a kd-tree without some of the words");
+        for (const int row : rows) InsertOne(row, tree);
       }
-      if (rows.size() != count) in.Damaged("a kd-tree without some of the words");
     }
   }
 
@@ -179,8 +166,7 @@ class FlannIndex : public DescriptorIndex {
 
   std::size_t dimensions_;
   int checks_per_tree_;
-  int size_ = 0;  // living words
-  internal::WordStorage storage_;
+  int size_ = 0;             // living words
   std::vector<char> alive_;  // by row number: found by searches; the dead ones stay in the trees
   std::vector<GrownTree> trees_;
 };

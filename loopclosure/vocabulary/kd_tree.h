@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <utility>
 #include <vector>
 
-#include "core/byte_stream.h"
 #include "core/index.h"
+#include "core/state_archive.h"
 #include "loopclosure/features/distances.h"
-#include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
@@ -95,54 +92,17 @@ class KdTree {
     }
   }
 
-  /// Appends the shape, with each row by its number in `rank` (by row).
-  void Save(const std::vector<int>& rank, ByteWriter& out) const {
-    std::vector<int> ahead;
-    std::vector<float> values;
-    if (size_ > 0) ahead.push_back(kRoot);
-    while (!ahead.empty()) {
-      const Node& node = At(ahead.back());
-      ahead.pop_back();
-      if (IsLeaf(node)) {
-        out.PutSignedVarint(-1 - rank[Index(node.link)]);
-        continue;
-      }
-      out.PutSignedVarint(node.dimension);
-      values.push_back(node.value);
-      ahead.insert(ahead.end(), {node.link + 1, node.link});
+  /// The shape, with each row by its number in `ranks` (WordStorage::Ranks). It is read into an empty tree,
+  /// and must have all rows, each once.
+  template <class Archive>
+  void State(Archive& archive, const std::vector<int>& ranks) {
+    std::vector<int> nodes;  // from the root on, the first child first: the dimension, or of a leaf -1 - rank
+    std::vector<float> values;  // of the splits
+    if constexpr (!Archive::kReading) List(ranks, nodes, values);
+    archive(SmallNumbers{&nodes}, Planes{&values});
+    if constexpr (Archive::kReading) {
+      if (!Grow(static_cast<int>(ranks.size()), nodes, values)) archive.Damaged("an impossible kd-tree");
     }
-    out.PutPlanes(values);
-  }
-
-  /// Takes up what Save wrote, into an empty tree: it must have all rows 0 .. rows - 1, each once.
-  void Load(int rows, ByteReader& in) {
-    for (int row = 0; row < rows; ++row) {
-      leaf_of_row_.Extend();
-      leaf_of_row_[Index(row)] = -1;
-    }
-    std::vector<int> ahead, splits;
-    if (rows > 0) ahead.push_back(NewPair(-1));
-    while (!ahead.empty()) {
-      const int node = ahead.back();
-      ahead.pop_back();
-      const std::int64_t what = in.GetSignedVarint();
-      if (what < 0) {
-        if (-1 - what >= rows || leaf_of_row_[Index(static_cast<int>(-1 - what))] >= 0)
-          in.Damaged("a kd-tree with an impossible word");
-        SetLeaf(node, static_cast<int>(-1 - what));
-        ++size_;
-        continue;
-      }
-      if (what >= dimensions_) in.Damaged("a kd-tree with an impossible dimension");
-      const int child = NewPair(node);
-      At(node) = {child, static_cast<int>(what), 0.0f};
-      splits.push_back(node);
-      ahead.insert(ahead.end(), {child + 1, child});
-    }
-    const std::vector<float> values = in.GetPlanes();
-    if (values.size() != splits.size()) in.Damaged("a kd-tree without its values");
-    for (std::size_t i = 0; i < splits.size(); ++i) At(splits[i]).value = values[i];
-    if (size_ != rows) in.Damaged("a kd-tree without some of the words");
   }
 
  private:
@@ -201,6 +161,47 @@ class KdTree {
   void SetLeaf(int node, int row) {
     At(node) = {row, -1, 0.0f};
     leaf_of_row_[Index(row)] = node;
+  }
+
+  void List(const std::vector<int>& ranks, std::vector<int>& nodes, std::vector<float>& values) const {
+    std::vector<int> ahead;
+    if (size_ > 0) ahead.push_back(kRoot);
+    while (!ahead.empty()) {
+      const Node& node = At(ahead.back());
+      ahead.pop_back();
+      nodes.push_back(IsLeaf(node) ? -1 - ranks[Index(node.link)] : node.dimension);
+      if (IsLeaf(node)) continue;
+      values.push_back(node.value);
+      ahead.insert(ahead.end(), {node.link + 1, node.link});
+    }
+  }
+
+  // The tree that List described, of `rows` rows; false if there is no such tree.
+  bool Grow(int rows, const std::vector<int>& nodes, const std::vector<float>& values) {
+    for (int row = 0; row < rows; ++row) {
+      leaf_of_row_.Extend();
+      leaf_of_row_[Index(row)] = -1;
+    }
+    std::vector<int> ahead;
+    if (rows > 0) ahead.push_back(NewPair(-1));
+    auto value = values.begin();
+    for (const int listed : nodes) {
+      if (ahead.empty()) return false;
+      const int node = ahead.back();
+      ahead.pop_back();
+      const int row = -1 - listed;
+      if (row >= 0) {
+        if (row >= rows || leaf_of_row_[Index(row)] >= 0) return false;
+        SetLeaf(node, row);
+        ++size_;
+        continue;
+      }
+      if (listed >= dimensions_ || value == values.end()) return false;
+      const int child = NewPair(node);
+      At(node) = {child, listed, *value++};
+      ahead.insert(ahead.end(), {child + 1, child});
+    }
+    return ahead.empty() && value == values.end() && size_ == rows;
   }
 
   // What was elsewhere is here now.

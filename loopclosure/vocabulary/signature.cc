@@ -1,9 +1,11 @@
 #include "loopclosure/vocabulary/signature.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 
-#include "core/byte_stream.h"
+#include "core/index.h"
+#include "core/state_archive.h"
 
 namespace tutti {
 
@@ -40,43 +42,38 @@ double Signature::Similarity(const Signature& a, const Signature& b) {
 }
 
 std::vector<Signature> Signature::Split(int parts) const {
-  std::vector<Signature> split(static_cast<std::size_t>(parts));
+  std::vector<Signature> split(internal::Index(parts));
   for (const Entry& entry : entries_) {
-    Signature& part = split[static_cast<std::size_t>(entry.word % parts)];
+    Signature& part = split[internal::Index(entry.word % parts)];
     part.entries_.push_back({entry.word / parts, entry.count});
     part.size_ += entry.count;
   }
   return split;
 }
 
-void Signature::Save(internal::ByteWriter& out) const {
-  out.PutVarint(entries_.size());
-  int before = -1;
+template <class Archive>
+void Signature::State(Archive& archive) {
+  std::vector<int> words, counts;
   for (const Entry& entry : entries_) {
-    out.PutVarint(static_cast<std::uint64_t>(entry.word - before - 1));
-    out.PutVarint(static_cast<std::uint64_t>(entry.count));
-    before = entry.word;
+    words.push_back(entry.word);
+    counts.push_back(entry.count);
+  }
+  archive(internal::GrowingNumbers{&words}, internal::SmallNumbers{&counts});
+  if constexpr (Archive::kReading) {
+    if (words.size() != counts.size()) archive.Damaged("words without counts");
+    entries_.clear();
+    std::int64_t size = 0;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (counts[i] < 1) archive.Damaged("a word that is not there");
+      entries_.push_back({words[i], counts[i]});
+      size += counts[i];
+    }
+    if (size > std::numeric_limits<int>::max()) archive.Damaged("a signature of an impossible size");
+    size_ = static_cast<int>(size);
   }
 }
 
-Signature Signature::Load(internal::ByteReader& in) {
-  Signature signature;
-  constexpr int kMost = std::numeric_limits<int>::max();
-  const std::uint64_t count = in.GetVarint();
-  if (count > in.Left() / 2) in.Damaged("more words than bytes");
-  signature.entries_.reserve(static_cast<std::size_t>(count));
-  std::int64_t size = 0;
-  int before = -1;
-  for (std::uint64_t i = 0; i < count; ++i) {
-    before += 1 + in.GetVarintIndex(kMost - 1 - before);
-    const int times = in.GetVarintIndex(kMost);
-    if (times < 1) in.Damaged("a signature out of order");
-    signature.entries_.push_back({before, times});
-    size += times;
-  }
-  if (size > std::numeric_limits<int>::max()) in.Damaged("a signature of an impossible size");
-  signature.size_ = static_cast<int>(size);
-  return signature;
-}
+template void Signature::State(internal::StateWriter& archive);
+template void Signature::State(internal::StateReader& archive);
 
 }  // namespace tutti

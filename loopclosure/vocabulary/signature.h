@@ -1,15 +1,9 @@
 // What one member remembers of one image: which of its words were seen, and how often.
 #pragma once
 
-#include <utility>
 #include <vector>
 
 namespace tutti {
-
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
 
 /// Bag of words of one image: z_t of loop-closure.md section 1.
 class Signature {
@@ -39,10 +33,8 @@ class Signature {
   /// Its words stay apart by interleaving the ids: word w of part k is word w * parts + k.
   std::vector<Signature> Split(int parts) const;
 
-  /// Appends the entries.
-  void Save(internal::ByteWriter& out) const;
-  /// What Save wrote. Throws InputError if it is damaged.
-  static Signature Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   std::vector<Entry> entries_;

@@ -3,64 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
-#include "core/byte_stream.h"
+#include "core/index.h"
 #include "core/parallel.h"
-#include "loopclosure/features/distances.h"
+#include "core/state_archive.h"
 #include "loopclosure/features/whole_rows.h"
 #include "loopclosure/vocabulary/word_storage.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
-
-// True distances of an image's descriptors to those of them that became words, exactly.
-class AmongThemselves {
- public:
-  explicit AmongThemselves(const cv::Mat& descriptors) : descriptors_(descriptors) {
-    for (std::vector<float>& distances : block_) distances.resize(static_cast<std::size_t>(descriptors.rows));
-    if (descriptors.type() != CV_32F) return;
-    for (const float scale : {1.0f, internal::WholeRows::kSignedSquares}) {
-      scale_ = scale;
-      whole_ = internal::WholeRows::Of(descriptors, scale);
-      if (!whole_) continue;
-      columns_.emplace(*whole_);
-      return;
-    }
-  }
-
-  // Of row i to the rows `to`, all of them before it; for i = 0, 1, 2, ... in this order.
-  const std::vector<float>& Of(int i, const std::vector<int>& to) {
-    distances_.resize(to.size());
-    if (columns_) {
-      if (i % internal::WholeRows::kTogether == 0) whole_->Distances(i, *columns_, block_);
-      const std::vector<float>& all = block_.at(static_cast<std::size_t>(i % internal::WholeRows::kTogether));
-      for (std::size_t k = 0; k < to.size(); ++k)
-        distances_[k] = std::sqrt(all[static_cast<std::size_t>(to[k])]) / scale_;
-      return distances_;
-    }
-    for (std::size_t k = 0; k < to.size(); ++k) {
-      if (descriptors_.type() == CV_8U) {
-        internal::HammingDistances(descriptors_.ptr(i), descriptors_.ptr(to[k]), 1, descriptors_.cols, 0,
-                                   &distances_[k]);
-      } else {
-        internal::SquaredDistances(descriptors_.ptr<float>(i), descriptors_.ptr<float>(to[k]), 1,
-                                   descriptors_.cols, 0, &distances_[k]);
-        distances_[k] = std::sqrt(distances_[k]);
-      }
-    }
-    return distances_;
-  }
-
- private:
-  const cv::Mat& descriptors_;
-  float scale_ = 1.0f;
-  std::optional<internal::WholeRows> whole_;
-  std::optional<internal::WholeRows::Columns> columns_;
-  internal::WholeRows::Block block_;
-  std::vector<float> distances_;
-};
 
 std::string TypeName(int type, int width) {
   return (type == CV_32F  ? "CV_32F x "
@@ -105,7 +57,7 @@ void Vocabulary::MakeIndex() {
 
 std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
   if (descriptors.rows == 0) return {};
-  std::vector<TwoNearest> nearest(static_cast<std::size_t>(descriptors.rows));
+  std::vector<TwoNearest> nearest(internal::Index(descriptors.rows));
   constexpr int kBlock = 50;
   RunParallel((descriptors.rows + kBlock - 1) / kBlock, threads, [&](int block) {
     Search(descriptors, block * kBlock, std::min(descriptors.rows, (block + 1) * kBlock), nearest);
@@ -133,13 +85,14 @@ std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vecto
   CheckType(descriptors);
   const int old_words = created_;
   std::vector<int> created;  // rows that became words
-  AmongThemselves among(descriptors);
+  internal::RowDistances among_themselves(descriptors, descriptors);
   words.reserve(nearest.size());
   for (int i = 0; i < descriptors.rows; ++i) {
-    TwoNearest best = nearest[static_cast<std::size_t>(i)];
-    const std::vector<float>& distances = among.Of(i, created);
-    for (std::size_t k = 0; k < distances.size(); ++k) {
-      if (distances[k] < best.second_distance) best.Offer(old_words + static_cast<int>(k), distances[k]);
+    TwoNearest best = nearest[internal::Index(i)];
+    const std::vector<float>& squares = among_themselves.To(i, i);
+    for (std::size_t k = 0; k < created.size(); ++k) {
+      const float distance = std::sqrt(squares[internal::Index(created[k])]) / among_themselves.scale();
+      if (distance < best.second_distance) best.Offer(old_words + static_cast<int>(k), distance);
     }
     if (IsNew(best)) {
       words.push_back(old_words + static_cast<int>(created.size()));
@@ -205,41 +158,39 @@ cv::Mat Vocabulary::Descriptor(int word) const {
   return row;
 }
 
-void Vocabulary::Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const {
-  out.Put<std::int32_t>(type_);
-  out.Put<std::int32_t>(width_);
-  out.Put<std::int32_t>(created_);
-  out.Put<std::uint64_t>(references_.size());
-  int before = -1;
-  references_.ForEach([&](int word, int count) {
-    out.PutVarint(static_cast<std::uint64_t>(word - before - 1));
-    out.PutVarint(static_cast<std::uint64_t>(count));
-    before = word;
-  });
-  if (index_) index_->Save(known, out);
-}
-
-void Vocabulary::Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) {
+template <class Archive>
+void Vocabulary::Beside::State(Archive& archive) {
   static_assert(kMostWords == internal::WordStorage::kMostWords);
   constexpr int kMostColumns = 1 << 16;
-  type_ = in.Get<std::int32_t>();
-  width_ = in.Get<std::int32_t>();
-  created_ = in.Get<std::int32_t>();
-  if (type_ != -1 && type_ != CV_32F && type_ != CV_8U) in.Damaged("descriptors of an unknown type");
-  if (type_ != -1 && (width_ <= 0 || width_ > kMostColumns)) in.Damaged("descriptors of an impossible width");
-  if (created_ < 0 || created_ > kMostWords) in.Damaged("an impossible number of words");
-  const std::size_t count = in.GetCount(2);
-  int word = -1;
-  for (std::size_t i = 0; i < count; ++i) {
-    word += 1 + in.GetVarintIndex(created_ - 1 - word);
-    const int references = in.GetVarintIndex(kMostWords + 1);
-    if (references < 1) in.Damaged("a word without a location");
-    references_[word] = references;
+  Vocabulary& v = *vocabulary;
+  std::vector<int> words, references;
+  v.references_.ForEach([&](int word, int count) {
+    words.push_back(word);
+    references.push_back(count);
+  });
+  archive(v.type_, v.width_, v.created_, internal::GrowingNumbers{&words},
+          internal::SmallNumbers{&references});
+  if constexpr (Archive::kReading) {
+    if (v.type_ != -1 && v.type_ != CV_32F && v.type_ != CV_8U)
+      archive.Damaged("descriptors of an unknown type");
+    if (v.type_ != -1 && (v.width_ <= 0 || v.width_ > kMostColumns))
+      archive.Damaged("descriptors of an impossible width");
+    if (v.created_ < 0 || v.created_ > kMostWords) archive.Damaged("an impossible number of words");
+    if (!words.empty() && words.back() >= v.created_) archive.Damaged("a word that was never made");
+    if (words.size() != references.size()) archive.Damaged("words without locations");
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (references[i] < 1 || references[i] > kMostWords) archive.Damaged("a word without a location");
+      v.references_[words[i]] = references[i];
+    }
+    if (v.type_ != -1) v.MakeIndex();
   }
-  if (type_ == -1) return;
-  MakeIndex();
-  index_->Load(known, in);
-  if (index_->size() > created_) in.Damaged("more words than were ever made");
+  if (v.index_) v.index_->State(archive, known);
+  if constexpr (Archive::kReading) {
+    if (v.size() > v.created_) archive.Damaged("more words than were ever made");
+  }
 }
+
+template void Vocabulary::Beside::State(internal::StateWriter& archive);
+template void Vocabulary::Beside::State(internal::StateReader& archive);
 
 }  // namespace tutti

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "loopclosure/store/packed_mat.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/signature.h"
 #include "loopclosure/vocabulary/word_map.h"
@@ -44,7 +45,7 @@ class Vocabulary {
   void Search(const cv::Mat& descriptors, int begin, int end, std::vector<TwoNearest>& nearest) const;
   /// The second step: a word for each of N descriptors, of which `nearest` (size N) holds what Search found.
   std::vector<int> Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest);
-  /// Of what Search found, the words that Assign would not make new, -1 for the others: nothing is added.
+  /// The words of what Search found that Assign would not make new, -1 for the others: nothing is added.
   std::vector<int> Recognise(const std::vector<TwoNearest>& nearest) const;
 
   /// One more location that has these words.
@@ -72,11 +73,15 @@ class Vocabulary {
   /// Ids below this are taken, wherever their words may be.
   void SkipIds(int created) { created_ = std::max(created_, created); }
 
-  /// Appends the whole state. `known`: descriptors that whoever loads it has, too, and in the same order; a
-  /// word that is among them takes a few bytes.
-  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object of the same options. Throws InputError if it is damaged.
-  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in);
+  /// The state beside `known`: descriptors that whoever loads it has, too, and in the same order; a word that
+  /// is among them takes a few bytes.
+  struct Beside {
+    Vocabulary* vocabulary;
+    std::vector<internal::PackedMat> known;
+
+    template <class Archive>
+    void State(Archive& archive);
+  };
 
  private:
   void CheckType(const cv::Mat& descriptors);

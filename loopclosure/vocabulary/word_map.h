@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/index.h"
+
 namespace tutti {
 
 /// Values by word id. Ids are handed out one after the other and leave memory in much the same order, so
@@ -20,7 +22,6 @@ class WordMap {
     const Page* page = PageOf(word);
     return page != nullptr && page->present[Offset(word)] ? &page->values[Offset(word)] : nullptr;
   }
-  /// As above.
   T* Find(int word) { return const_cast<T*>(std::as_const(*this).Find(word)); }
 
   /// The value of a word (an id, not negative); it is made if there is none.
@@ -66,8 +67,8 @@ class WordMap {
     std::bitset<kPage> present;
     T values[kPage] = {};
   };
-  static std::size_t Number(int word) { return static_cast<std::size_t>(word) / kPage; }
-  static std::size_t Offset(int word) { return static_cast<std::size_t>(word) % kPage; }
+  static std::size_t Number(int word) { return internal::Index(word) / kPage; }
+  static std::size_t Offset(int word) { return internal::Index(word) % kPage; }
   const Page* PageOf(int word) const {
     const std::size_t number = Number(word);
     return number < pages_.size() ? pages_[number].get() : nullptr;

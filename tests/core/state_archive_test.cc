@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <climits>
 #include <cmath>
 #include <limits>
 
@@ -86,6 +87,22 @@ TEST(StateArchive, WhatIsReadWritesTheSameBytes) {
   EXPECT_TRUE(std::signbit(read.pose.translation.y()));
   EXPECT_EQ(read.map.at(7), (std::vector<int>{8, 9}));
   EXPECT_FALSE(read.nothing.has_value());
+}
+
+TEST(StateArchive, SmallAndGrowingNumbersTakeAByteEach) {
+  std::vector<int> small = {0, -1, 63, -64}, growing = {0, 1, 5, 100}, wide = {INT_MIN, INT_MAX},
+                   last = {INT_MAX};
+  const std::string bytes = StateBytes(SmallNumbers{&small}, GrowingNumbers{&growing});
+  EXPECT_EQ(bytes.size(), 2 * (1 + 4u));
+  std::vector<int> a = {7}, b, c;
+  ReadStateBytes(bytes, "f", SmallNumbers{&a}, GrowingNumbers{&b});
+  EXPECT_EQ(a, small);
+  EXPECT_EQ(b, growing);
+  ReadStateBytes(StateBytes(SmallNumbers{&wide}), "f", SmallNumbers{&c});
+  EXPECT_EQ(c, wide);
+  const std::string beyond = StateBytes(GrowingNumbers{&last});
+  EXPECT_THROW(ReadStateBytes(beyond, "f", GrowingNumbers{&c}), InputError) << "none can follow it";
+  EXPECT_THROW(ReadStateBytes("\x05\x01", "f", SmallNumbers{&c}), InputError) << "more numbers than bytes";
 }
 
 TEST(StateArchive, AnObjectThatTwoPointToIsOneAfterwards) {

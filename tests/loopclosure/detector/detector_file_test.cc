@@ -10,11 +10,10 @@
 #include <functional>
 #include <limits>
 
-#include "core/byte_stream.h"
 #include "core/section_file.h"
+#include "core/state_archive.h"
 #include "loopclosure/detector/detector_file.h"
 #include "loopclosure/geometry/verification.h"
-#include "loopclosure/geometry/view_bytes.h"
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -60,7 +59,7 @@ class SavedDetector : public ::testing::Test {
   fs::path file_ = folder_ / "places.tutti";
 };
 
-// Of the second lap, all that can be merged into the first is.
+// All of the second lap that can be merged into the first is.
 TEST_F(SavedDetector, MergedLocationsAreForgottenAndTheirPlacesFoundInTheOlderOnes) {
   for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
     LoopDetectorOptions options = testing::SmallOptions();
@@ -261,13 +260,11 @@ TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAr
   const fs::path changed = folder_ / "changed";
   const auto load = [&](const std::function<void(View&)>& change) {
     Change(file_, changed, internal::kViewSection, [&](const std::string& section) {
-      internal::ByteReader in(section, "test");
-      internal::ByteWriter out;
-      out.Put(in.Get<std::int32_t>());
-      View view = internal::LoadView(in);
+      int slot = 0;
+      View view;
+      internal::ReadStateBytes(section, "test", slot, view);
       change(view);
-      internal::SaveView(view, out);
-      return out.bytes();
+      return internal::StateBytes(slot, view);
     });
     LoopDetector(BoundedOptions()).Load(changed);
   };
@@ -277,35 +274,6 @@ TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAr
   EXPECT_THROW(load([](View& view) { view.members.pop_back(); }), InputError);
   EXPECT_THROW(load([](View& view) { view.members[0].pixels[0].x = std::nanf(""); }), InputError);
   EXPECT_THROW(load([](View& view) { view.members[1].pixels[0].y = -1e30f; }), InputError);
-}
-
-TEST(SavedView, KeepsItsCamerasAndTheCallersNumbers) {
-  View view;
-  view.id = 3;
-  view.size = {640, 240};
-  view.cameras = {{0, 0, 320, 240}, {320, 0, 320, 240}};
-  view.members.resize(1);
-  view.caller.pixels = {{1, 2}, {3, 4}};
-  view.caller.descriptors = cv::Mat(cv::Mat::eye(2, 8, CV_8U));
-  view.caller.numbers = {4, 7};
-  const auto again = [](const View& saved) {
-    internal::ByteWriter out;
-    internal::SaveView(saved, out);
-    internal::ByteReader in(out.bytes(), "test");
-    View loaded = internal::LoadView(in);
-    EXPECT_TRUE(in.AtEnd());
-    return loaded;
-  };
-  const View loaded = again(view);
-  EXPECT_EQ(loaded.cameras, view.cameras);
-  EXPECT_EQ(loaded.caller.numbers, view.caller.numbers);
-  view.caller.numbers = {4};
-  EXPECT_THROW(again(view), InputError);
-  view.caller.numbers = {4, -1};
-  EXPECT_THROW(again(view), InputError);
-  view.caller.numbers.clear();
-  view.cameras = {{0, 0, 0, 240}, {320, 0, 320, 240}};
-  EXPECT_THROW(again(view), InputError);
 }
 
 TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tests/support/full_disk.h"
@@ -96,15 +95,6 @@ TEST(LoopDetectorMemory, ATimeBudgetThatIsExceededShrinksWorkingMemory) {
   Walk(detector, 0, kMemoryPlaces, kMemoryPlaces);
   // STM, what it is linked to, what is near the hypothesis, and what has just come back.
   EXPECT_LE(detector.NumLocations(), 3u + 1u + 5u + 2u);
-}
-
-TEST(LoopDetectorMemory, TheSameImageAgainAndAgainIsOneLocationUnderRehearsal) {
-  LoopDetectorOptions options = SmallOptions();
-  options.rehearsal = true;
-  LoopDetector detector(options);
-  const cv::Mat image = testing::TexturedImage(1, 240, 180);
-  for (int i = 0; i < 12; ++i) detector.Detect(image, i);
-  EXPECT_EQ(detector.NumLocations(), 1u);
 }
 
 TEST(LoopDetectorMemory, ImagesWithoutFeaturesAreNoLocationsIfToldSo) {

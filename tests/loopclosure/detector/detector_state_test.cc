@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "loopclosure/geometry/view_bytes.h"
+#include "core/state_archive.h"
 #include "tests/loopclosure/detector/shown_state.h"
 
 namespace tutti::internal {
@@ -12,18 +12,6 @@ using tutti::testing::OneMember;
 using tutti::testing::Query;
 using tutti::testing::RefusalOf;
 using tutti::testing::Show;
-
-std::string BytesOf(const View& view) {
-  ByteWriter out;
-  SaveView(view, out);
-  return out.bytes();
-}
-
-void Load(DetectorState& state, int slot, const View& view) {
-  const std::string bytes = BytesOf(view);
-  ByteReader in(bytes, "test");
-  state.LoadView(slot, internal::LoadView(in), "test");
-}
 
 TEST(DetectorState, EveryLocationHasItsViewUntilItIsDropped) {
   DetectorState state(OneMember());
@@ -61,16 +49,16 @@ TEST(DetectorState, AViewOfAnotherLocationOrOtherMembersOrAnotherKindIsRefused) 
   DetectorState state(OneMember());
   Show(state, 0, 2);
   const View good = state.view(1);
-  EXPECT_NO_THROW(Load(state, 1, good));
-  EXPECT_NE(RefusalOf([&] { Load(state, 0, good); }).find("another location"), std::string::npos);
+  EXPECT_NO_THROW(state.LoadView(1, good, "test"));
+  EXPECT_NE(RefusalOf([&] { state.LoadView(0, good, "test"); }).find("another location"), std::string::npos);
   View bad = good;
   bad.members.push_back(bad.members.front());
-  EXPECT_NE(RefusalOf([&] { Load(state, 1, bad); }).find("other members"), std::string::npos);
+  EXPECT_NE(RefusalOf([&] { state.LoadView(1, bad, "test"); }).find("other members"), std::string::npos);
   bad = good;
   bad.caller.pixels = {{1, 2}};
   bad.caller.descriptors = cv::Mat(1, 8, CV_8U, cv::Scalar(0));
-  EXPECT_NE(RefusalOf([&] { Load(state, 1, bad); }).find("another kind"), std::string::npos);
-  EXPECT_EQ(BytesOf(state.view(1)), BytesOf(good));
+  EXPECT_NE(RefusalOf([&] { state.LoadView(1, bad, "test"); }).find("another kind"), std::string::npos);
+  EXPECT_EQ(StateBytes(state.view(1)), StateBytes(good));
 }
 
 TEST(DetectorState, ViewsGoToAStoreAndComeBackTheSame) {
@@ -78,10 +66,10 @@ TEST(DetectorState, ViewsGoToAStoreAndComeBackTheSame) {
   Show(state, 0, 2);
   LocationStore store("");
   state.StoreView(0, store);
-  const std::string before = BytesOf(state.view(0));
+  const std::string before = StateBytes(state.view(0));
   state.DropView(0);
   state.FetchView(0, store);
-  EXPECT_EQ(BytesOf(state.view(0)), before);
+  EXPECT_EQ(StateBytes(state.view(0)), before);
   EXPECT_NE(RefusalOf([&] { state.FetchView(1, store); }).find("location 1 are missing"), std::string::npos);
   store.Put(LocationStore::Kind::kView, 0, 1, before.substr(0, before.size() / 2));
   EXPECT_THROW(state.FetchView(1, store), InputError);
@@ -93,21 +81,19 @@ TEST(DetectorState, StatisticsComeBackTheSameAndDamagedOnesAreRefused) {
   query.features.keypoints = {{cv::Point2f(40, 100), 8}};
   query.features.descriptors = cv::Mat::zeros(1, 16, CV_32F);
   Show(state, query);
-  const std::string bytes = state.Statistics();
+  const std::string bytes = StateBytes(state);
   DetectorState other(OneMember());
-  ByteReader in(bytes, "test");
-  other.LoadStatistics(in);
-  EXPECT_TRUE(in.AtEnd());
+  ReadStateBytes(bytes, "test", other);
   EXPECT_EQ(other.last_id(), 4);
   EXPECT_EQ(other.callers_descriptors().type, CV_32F);
   EXPECT_EQ(other.callers_descriptors().width, 16);
-  EXPECT_EQ(other.Statistics(), bytes);
+  EXPECT_EQ(StateBytes(other), bytes);
   // The last location that they speak of is not there.
   EXPECT_NE(RefusalOf([&] { other.CheckMemories("test"); }).find("last location"), std::string::npos);
   EXPECT_EQ(RefusalOf([&] { state.CheckMemories("test"); }), "");
   for (std::size_t length = 0; length < bytes.size(); ++length) {
-    ByteReader cut(std::string_view(bytes).substr(0, length), "test");
-    EXPECT_THROW(DetectorState(OneMember()).LoadStatistics(cut), InputError) << length;
+    DetectorState cut(OneMember());
+    EXPECT_THROW(ReadStateBytes(bytes.substr(0, length), "test", cut), InputError) << length;
   }
 }
 

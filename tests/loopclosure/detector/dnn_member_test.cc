@@ -33,34 +33,20 @@ LoopDetectorOptions DnnMemberOptions(const std::vector<std::string>& members,
 }
 
 std::vector<LoopResult> TwoWalksOfDnn(const LoopDetectorOptions& options, int images_again) {
-  LoopDetector detector(options);
-  std::vector<LoopResult> results;
-  for (int i = 0; i < kWallPlaces + images_again; ++i) {
-    const cv::Mat image = i < kWallPlaces ? AlongWall(i) : testing::SeenAgain(AlongWall(i - kWallPlaces));
-    results.push_back(detector.Detect(image, i));
-  }
-  return results;
-}
-
-int LoopsFound(const std::vector<LoopResult>& results) {
-  int found = 0;
-  for (std::size_t i = kWallPlaces; i < results.size(); ++i) {
-    const bool near = std::abs(results[i].best - (results[i].query - kWallPlaces)) <= 1;
-    if (near && results[i].hypothesis >= 0.5) ++found;
-  }
-  return found;
+  return testing::TwoWalks(options, images_again, [](int i) { return testing::SeenAgain(AlongWall(i)); });
 }
 
 class DnnMember : public testing::SmallNetworks {};
 
 TEST_F(DnnMember, FindsTheSecondLapAloneAndAmongOthers) {
   const std::vector<LoopResult> alone = TwoWalksOfDnn(DnnMemberOptions({"dnn"}, Network("edges")), 30);
-  EXPECT_GE(LoopsFound(alone), 15);
+  EXPECT_GE(testing::PlacesFound(alone), 15);
   EXPECT_EQ(alone.back().members.front().name, "dnn");
   EXPECT_TRUE(alone.back().members.front().took_part);
   EXPECT_EQ(alone.back().members.front().features, 1);
-  const int corners = LoopsFound(TwoWalksOfDnn(DnnMemberOptions({"orb"}, ""), 30));
-  EXPECT_GE(LoopsFound(TwoWalksOfDnn(DnnMemberOptions({"orb", "dnn"}, Network("edges")), 30)), corners - 1);
+  const int corners = testing::PlacesFound(TwoWalksOfDnn(DnnMemberOptions({"orb"}, ""), 30));
+  EXPECT_GE(testing::PlacesFound(TwoWalksOfDnn(DnnMemberOptions({"orb", "dnn"}, Network("edges")), 30)),
+            corners - 1);
 }
 
 TEST_F(DnnMember, SameResultsForAnyNumberOfThreads) {
@@ -69,14 +55,6 @@ TEST_F(DnnMember, SameResultsForAnyNumberOfThreads) {
   const std::vector<LoopResult> one = TwoWalksOfDnn(options, 12);
   options.threads = 2;
   testing::ExpectEqual(one, TwoWalksOfDnn(options, 12));
-}
-
-TEST_F(DnnMember, LocatesOneImageByItself) {
-  LoopDetector detector(DnnMemberOptions({"dnn"}, Network("edges")));
-  for (int i = 0; i < kWallPlaces; ++i) detector.Detect(AlongWall(i), i);
-  LoopQuery query;
-  query.image = testing::SeenAgain(AlongWall(12));
-  EXPECT_EQ(detector.Locate(query).candidate, 12);
 }
 
 TEST_F(DnnMember, SavedMemoriesAreForTheSameNetwork) {

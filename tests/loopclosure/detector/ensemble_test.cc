@@ -17,14 +17,6 @@ LoopDetectorOptions WithThreads(int threads) {
   return options;
 }
 
-TEST(Ensemble, OptionsThatAreNotUsableAreRefused) {
-  LoopDetectorOptions options;
-  options.members.clear();
-  EXPECT_THROW(Ensemble{options}, InputError);
-  options.members = {"nobody"};
-  EXPECT_THROW(Ensemble{options}, InputError);
-}
-
 TEST(Ensemble, EveryMemberSeesWordsAndKnowsThemAgainWithoutLearning) {
   Ensemble ensemble(WithThreads(1));
   const LoopQuery query = Query(0, TexturedImage(3));

@@ -182,7 +182,7 @@ TEST_F(OrderOfSearch, TheBestThatWasTriedIsToldThoughNothingIsAccepted) {
   EXPECT_EQ(result.reason, "reason of 10");
 }
 
-// Of a flat picture that is `size` / 20 as large in the candidate as in the query.
+// A flat picture is `size` / 20 as large in the candidate as in the query.
 std::vector<VerifiedMatch> MatchesOfAPicture(double size) {
   std::vector<VerifiedMatch> matches;
   for (int i = 0; i < 64; ++i) {
@@ -207,6 +207,35 @@ TEST_F(HypothesisSearchTest, TheLoopIsSaidWithTheNearestViewOfThePlace) {
   EXPECT_TRUE(result.accepted);
   EXPECT_EQ(result.verification.candidate, 23);
   EXPECT_LE(result.tried.size(), 4U);
+}
+
+Verification Seen(double mass, double log_nfa) {
+  Verification verification;
+  verification.mass = mass;
+  verification.log_nfa = log_nfa;
+  return verification;
+}
+
+TEST(LoopProbability, GrowsWithBeliefAndWithWhatChanceCannotExplain) {
+  EXPECT_LT(LoopProbability(Seen(0.2, -50)), LoopProbability(Seen(0.9, -50)));
+  EXPECT_LT(LoopProbability(Seen(0.5, -10)), LoopProbability(Seen(0.5, -100)));
+}
+
+TEST(LoopProbability, NeedsBeliefAndGeometry) {
+  const double threshold = LoopDetectorOptions().loop_threshold;
+  EXPECT_GT(LoopProbability(Seen(0.95, -80)), threshold);
+  EXPECT_LT(LoopProbability(Seen(0.5, 0)), threshold);     // sure of the place, and nothing to see of it
+  EXPECT_LT(LoopProbability(Seen(0.01, -80)), threshold);  // a poster that hangs somewhere else, too
+}
+
+TEST(LoopProbability, IsAProbabilityForAnyInput) {
+  for (const double mass : {0.0, 1.0}) {
+    for (const double nfa : {-1e6, 0.0, 50.0}) {
+      const double p = LoopProbability(Seen(mass, nfa));
+      EXPECT_GT(p, 0.0);
+      EXPECT_LT(p, 1.0 + 1e-12);
+    }
+  }
 }
 
 }  // namespace

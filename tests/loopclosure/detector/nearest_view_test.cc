@@ -1,4 +1,4 @@
-#include "loopclosure/detector/nearest_view.h"
+#include "loopclosure/detector/hypothesis_search.h"
 
 #include <gtest/gtest.h>
 

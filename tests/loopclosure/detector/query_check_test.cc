@@ -1,4 +1,4 @@
-#include "loopclosure/detector/query_check.h"
+#include "loopclosure/detector/ensemble.h"
 
 #include <gtest/gtest.h>
 

@@ -72,6 +72,16 @@ class SecondWordTest : public ::testing::Test {
     return word->Say(options_, memory_, transition_, search);
   }
 
+  // What a file has of word_, beside this memory.
+  void Load(const LocationMemory& memory, SecondWord* loaded) {
+    const std::string bytes = StateBytes(word_);
+    SharedObjectsIn none;
+    StateReader in(bytes, "test", &none);
+    in(*loaded);
+    in.ExpectEnd();
+    loaded->Check(memory, in);
+  }
+
   LoopDetectorOptions options_;
   TransitionModel transition_;
   LocationMemory memory_;
@@ -158,11 +168,7 @@ TEST_F(SecondWordTest, AThresholdThatIsLowWithdrawsNothingOfItself) {
 
 // Rules with several filters never step, and without verification nothing is ever said.
 TEST_F(SecondWordTest, KeepsNoMoreThanItWaitsFor) {
-  const auto size = [&] {
-    ByteWriter out;
-    word_.Save(out);
-    return out.bytes().size();
-  };
+  const auto size = [&] { return StateBytes(word_).size(); };
   LoopResult result;
   const std::size_t empty = size();
   for (int slot = 0; slot < kPathLength; ++slot) word_.Keep(slot, result);
@@ -175,12 +181,8 @@ TEST_F(SecondWordTest, KeepsNoMoreThanItWaitsFor) {
 
 TEST_F(SecondWordTest, IsTheSameAfterAFile) {
   See({1.5, 6, 6, 6, 6, 6}, false);
-  ByteWriter out;
-  word_.Save(out);
   SecondWord loaded;
-  ByteReader in(out.bytes(), "test");
-  loaded.Load(memory_, in);
-  EXPECT_TRUE(in.AtEnd());
+  Load(memory_, &loaded);
   const std::optional<LateLoop> late = Say(&loaded);
   ASSERT_TRUE(late);
   EXPECT_EQ(late->probability, Say(&word_)->probability);
@@ -188,12 +190,10 @@ TEST_F(SecondWordTest, IsTheSameAfterAFile) {
 
 TEST_F(SecondWordTest, AFileOfALoopWithAnUnknownLocationIsDamaged) {
   See({30, 6, 6, 6, 6, 6}, true);
-  ByteWriter out;
-  word_.Save(out);
   LocationMemory shorter(10);
   for (int i = 0; i < kAsked; ++i) shorter.Add(i);
-  ByteReader in(out.bytes(), "test");
-  EXPECT_THROW(SecondWord().Load(shorter, in), InputError);
+  SecondWord loaded;
+  EXPECT_THROW(Load(shorter, &loaded), InputError);
 }
 
 }  // namespace

@@ -39,20 +39,6 @@ TEST(Evaluation, RecallAtFullPrecisionStopsBeforeTheFirstFalsePositive) {
   EXPECT_DOUBLE_EQ(result.best_f1, 2 * 0.75 * 0.75 / 1.5);
 }
 
-TEST(Evaluation, TiesStayTogether) {
-  const std::vector<LoopObservation> observations = {{5, 0.9, 0, false, -1}, {6, 0.9, 0, false, -1}};
-  EXPECT_DOUBLE_EQ(EvaluatePosterior(observations, Truth(), 0.1).recall_at_100_precision, 0.0);
-}
-
-TEST(Evaluation, AHypothesisOnAGreyCellIsDroppedButRowsStayInTheDenominator) {
-  const std::vector<LoopObservation> observations = {
-      {9, 0.95, 0, false, -1}, {5, 0.9, 0, false, -1}, {6, 0.2, -1, false, -1}};
-  const LoopEvaluation result = EvaluatePosterior(observations, Truth(), 0.1);
-  EXPECT_DOUBLE_EQ(result.recall_at_100_precision, 0.25);
-  EXPECT_EQ(result.ignored, 1);
-  EXPECT_EQ(result.false_positives, 0);
-}
-
 // By probability: 6 (right) before 5 (right), and among the refused 7 (right) before 4 (wrong). H ranks 7, 4
 // before 5, 6.
 std::vector<LoopObservation> TwoAcceptedTwoRefused() {
@@ -266,17 +252,6 @@ TEST(Evaluation, NoLoopInTheGroundTruthMeansRecallZero) {
   EXPECT_DOUBLE_EQ(result.area_under_curve, 0);
   EXPECT_DOUBLE_EQ(result.best_f1, 0);
   EXPECT_EQ(result.false_positives, 2);
-}
-
-TEST(Evaluation, AllMissedIsAllInTheDenominator) {
-  std::vector<LoopObservation> observations;
-  observations.reserve(10);
-  for (int i = 0; i < 10; ++i) observations.push_back({i, 0, -1, false, -1});
-  const LoopEvaluation result = EvaluateVerified(observations, Truth());
-  EXPECT_EQ(result.rows_with_loop, 4);
-  EXPECT_TRUE(result.curve.empty());
-  EXPECT_TRUE(result.found_at_100_precision.empty());
-  EXPECT_EQ(std::count(result.outcomes.begin(), result.outcomes.end(), LoopOutcome::kMissed), 4);
 }
 
 TEST(Evaluation, AHypothesisThatIsNoNumberHasNoRank) {

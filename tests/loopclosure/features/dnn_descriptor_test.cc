@@ -1,5 +1,5 @@
 // The member dnn: the descriptor of a network, and what is said of one that can't be used.
-#include "loopclosure/features/dnn_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -12,7 +11,7 @@
 
 #include "core/parallel.h"
 #include "loopclosure/geometry/matching.h"
-#include "loopclosure/store/signed_squares.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tests/loopclosure/features/textured_image.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/detector_options.h"
@@ -38,32 +37,6 @@ TEST_P(EveryMember, FindsFeaturesAndMatchesThemWhenSeenAgain) {
   EXPECT_LE(a.keypoints.size(), 400u);
   EXPECT_EQ(a.descriptors.rows, static_cast<int>(a.keypoints.size()));
   EXPECT_GT(MatchDescriptors(b.descriptors, a.descriptors, Pixels(a), 0.8).size(), 40u);
-}
-
-// Not all: OpenCV starts from an enlarged image, which moves weak points.
-TEST(FeatureExtractor, MostSiftPointsAndDescriptorsAreThoseOfOpenCv) {
-  const cv::Mat image = testing::TexturedImage(5, 640, 480);
-  ExtractionOptions options;
-  options.features = 300;
-  const Features ours = FeatureExtractor("sift", options).Extract(image);
-  ASSERT_EQ(ours.descriptors.rows, 300);
-  std::vector<cv::KeyPoint> keypoints;
-  cv::Mat descriptors;
-  cv::SIFT::create(0, 3, 0.01)->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
-  int same = 0;
-  for (int i = 0; i < ours.descriptors.rows; ++i) {
-    const cv::KeyPoint& a = ours.keypoints[static_cast<std::size_t>(i)];
-    double nearest = 1e9;
-    for (int k = 0; k < descriptors.rows; ++k) {
-      const cv::KeyPoint& b = keypoints[static_cast<std::size_t>(k)];
-      if (cv::norm(a.pt - b.pt) > 1.0 || std::abs(std::remainder(a.angle - b.angle, 360.0f)) > 10.0f)
-        continue;
-      if (std::abs(std::log2(a.size / b.size)) > 0.3f) continue;
-      nearest = std::min(nearest, cv::norm(ours.descriptors.row(i), descriptors.row(k)));
-    }
-    if (nearest < 150.0) ++same;  // of a length of 512
-  }
-  EXPECT_GT(same, 160);
 }
 
 TEST_P(EveryMember, ExtractsTheSameFromSeveralThreadsAtOnce) {

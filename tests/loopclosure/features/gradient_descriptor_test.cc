@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 
 namespace tutti {
 namespace {
@@ -136,7 +136,7 @@ TEST(GradientDescriptor, IsTheSameForAFaintImageAsForAStrongOne) {
   EXPECT_TRUE(DescribeByGradients(GreyRamp(0, 0)).empty());
 }
 
-// Of two levels that are one apart, half and half deviate by a half, a quarter and the rest by 0.43.
+// Half and half of two levels that are one apart deviate by a half, a quarter and the rest by 0.43.
 TEST(GradientDescriptor, NeedsADeviationOfHalfAGreyLevel) {
   cv::Mat image(kHeight, kWidth, CV_8UC1, cv::Scalar(100));
   image.colRange(0, kWidth / 2).setTo(101);

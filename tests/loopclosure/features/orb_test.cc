@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "tests/loopclosure/features/textured_image.h"
 #include "tests/support/test_data.h"
@@ -66,7 +67,7 @@ cv::Mat Noise(int seed, const cv::Size& size, double blur) {
   return noise;
 }
 
-// As the member has it: twice its quota of points.
+// The member asks for twice its quota of points.
 OrbOptions Default(const cv::Mat& image) { return OrbOptionsFor(image.size(), 800); }
 
 TEST(Orb, PointsAndDescriptorsAreThoseOfOpenCv) {
@@ -203,19 +204,14 @@ void CompareImages(const std::filesystem::path& folder, std::size_t images) {
   EXPECT_GT(points, 100 * images);
 }
 
-TEST(Orb, PointsAndDescriptorsAreThoseOfOpenCvOnARoad) {
-  TUTTI_REQUIRE_DATA(folder, "kitti_00_head");
-  CompareImages(folder / "image_0", 25);
-}
+class OrbOnData : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};
+INSTANTIATE_TEST_SUITE_P(Folders, OrbOnData,
+                         ::testing::Values(std::pair("kitti_00_head", "image_0"),
+                                           std::pair("redkitchen", "rgb"), std::pair("corridor", "")));
 
-TEST(Orb, PointsAndDescriptorsAreThoseOfOpenCvInAKitchen) {
-  TUTTI_REQUIRE_DATA(folder, "redkitchen");
-  CompareImages(folder / "rgb", 25);
-}
-
-TEST(Orb, PointsAndDescriptorsAreThoseOfOpenCvInACorridor) {
-  TUTTI_REQUIRE_DATA(folder, "corridor");
-  CompareImages(folder, 25);
+TEST_P(OrbOnData, PointsAndDescriptorsAreThoseOfOpenCv) {
+  TUTTI_REQUIRE_DATA(folder, GetParam().first);
+  CompareImages(folder / GetParam().second, 25);
 }
 
 }  // namespace

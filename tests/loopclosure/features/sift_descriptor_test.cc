@@ -1,5 +1,5 @@
 // Orientations and descriptors of SIFT: where they can be computed by hand, and as the paper defines them.
-#include "loopclosure/features/sift_descriptor.h"
+#include "loopclosure/features/sift.h"
 
 #include <gtest/gtest.h>
 
@@ -9,37 +9,18 @@
 #include <random>
 #include <vector>
 
+#include "loopclosure/features/polar.h"
 #include "tests/loopclosure/features/angles.h"
 
 namespace tutti::internal {
 namespace {
 
-constexpr float kScale = 3.0f;      // of the points on ramps [px]
-const cv::Point2f kCentre(40, 40);  // theirs
-constexpr int kSide = 81;           // of the images of ramps [px]
+constexpr float kScale = 3.0f;      // of the point in the valley [px]
+const cv::Point2f kCentre(40, 40);  // its place
+constexpr int kSide = 81;           // of the image of the valley [px]
 constexpr double kLongest = 512;    // length of a descriptor
 
 using testing::AnglesApart;
-
-// Grey levels that rise by one a pixel towards a direction [deg, counter-clockwise].
-cv::Mat RampTowards(double direction_deg) {
-  const double radians = direction_deg * CV_PI / 180;
-  cv::Mat image(kSide, kSide, CV_32F);
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      image.at<float>(y, x) = static_cast<float>(std::cos(radians) * x - std::sin(radians) * y);
-    }
-  }
-  return image;
-}
-
-TEST(SiftOrientations, OfARampIsItsDirection) {
-  for (int direction = 0; direction < 360; direction += 10) {
-    const std::vector<float> angles = SiftOrientations(RampTowards(direction), kCentre, kScale);
-    ASSERT_EQ(angles.size(), 1u) << direction;
-    EXPECT_LT(AnglesApart(angles[0], direction), 0.01) << direction;
-  }
-}
 
 // A valley that rises by one a pixel to the right, and by `other` to the left.
 std::vector<float> OrientationsInAValley(float other) {
@@ -57,56 +38,6 @@ TEST(SiftOrientations, ASecondOneCountsFromFourFifthsOfTheFirst) {
   ASSERT_EQ(both.size(), 2u);
   EXPECT_LT(AnglesApart(both[0], 0), 0.01);
   EXPECT_LT(AnglesApart(both[1], 180), 0.01);
-}
-
-// Share of a row or column of cells, -1.5 to 1.5 from the middle, in what lies under a window of a standard
-// deviation of two cells; each place is shared by the two cells beside it.
-double ShareOfCells(double middle) {
-  constexpr double kStep = 1e-3;
-  double sum = 0;
-  for (double x = middle - 1 + 0.5 * kStep; x < middle + 1; x += kStep) {
-    sum += kStep * (1 - std::abs(x - middle)) * std::exp(-x * x / (2 * 2 * 2));
-  }
-  return sum;
-}
-
-// Of a ramp that rises `turn_deg` counter-clockwise of a point's orientation: in all cells the same two
-// directions.
-std::vector<double> DescriptorOfARamp(double turn_deg) {
-  std::vector<double> values(kSiftValues, 0.0);
-  const double direction = turn_deg / 45;
-  const auto before = static_cast<std::size_t>(direction);
-  const double after = direction - static_cast<double>(before);
-  for (std::size_t cell = 0; cell < 16; ++cell) {
-    const std::size_t row = cell / 4, column = cell % 4;
-    const double weight =
-        ShareOfCells(static_cast<double>(column) - 1.5) * ShareOfCells(static_cast<double>(row) - 1.5);
-    values[8 * cell + before % 8] += weight * (1 - after);
-    values[8 * cell + (before + 1) % 8] += weight * after;
-  }
-  const auto stretch = [&](double length) {
-    const double now = cv::norm(values);
-    for (double& value : values) value *= length / now;
-  };
-  stretch(1.0);
-  for (double& value : values) value = std::min(value, 0.2);
-  stretch(kLongest);
-  return values;
-}
-
-TEST(SiftDescriptor, OfARampIsTheWindowInTwoDirectionsOfEveryCell) {
-  for (const double orientation : {0.0, 37.0, 200.0}) {
-    for (const double turn : {0.0, 22.5, 60.0, 135.0, 300.0, 341.0}) {
-      std::array<float, kSiftValues> ours{};
-      // cv::KeyPoint's angle is clockwise.
-      DescribeSift(RampTowards(orientation + turn), kCentre, kScale, static_cast<float>(360 - orientation),
-                   ours.data());
-      const std::vector<double> expected = DescriptorOfARamp(turn);
-      double worst = 0;
-      for (std::size_t i = 0; i < kSiftValues; ++i) worst = std::max(worst, std::abs(ours[i] - expected[i]));
-      EXPECT_LT(worst, 2.0);
-    }
-  }
 }
 
 // Values that have nothing to do with each other, so that each pixel's place and weight show.
@@ -246,3 +177,36 @@ TEST(SiftDescriptor, IsThatOfTheDefinitionUpToTheBorder) {
 
 }  // namespace
 }  // namespace tutti::internal
+
+namespace tutti {
+namespace {
+
+TEST(Polar, LengthAndDirectionOfEveryDirection) {
+  constexpr std::size_t kCount = 3601;
+  std::vector<float> dx(internal::RoomForPolar(kCount)), dy(dx.size()), length(dx.size()), angle(dx.size());
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const double direction = static_cast<double>(i) / 10.0 * M_PI / 180.0;
+    const double r = 0.01 + static_cast<double>(i % 300);
+    dx[i] = static_cast<float>(r * std::cos(direction));
+    dy[i] = static_cast<float>(r * std::sin(direction));
+  }
+  internal::Polar(dx.data(), dy.data(), kCount, length.data(), angle.data());
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const float r = 0.01f + static_cast<float>(i % 300);
+    EXPECT_NEAR(length[i], r, 1e-5f * r);
+    EXPECT_NEAR(std::remainder(angle[i] - static_cast<float>(i) / 10.0f, 360.0f), 0, 0.02f) << i;
+    EXPECT_GE(angle[i], 0);
+    EXPECT_LE(angle[i], 360);
+  }
+}
+
+TEST(Polar, NoGradientHasNoLengthAndAFiniteDirection) {
+  const std::vector<float> zero(4);
+  std::vector<float> length(4, 1), angle(4, 1);
+  internal::Polar(zero.data(), zero.data(), 1, length.data(), angle.data());
+  EXPECT_EQ(length[0], 0);
+  EXPECT_EQ(angle[0], 0);
+}
+
+}  // namespace
+}  // namespace tutti

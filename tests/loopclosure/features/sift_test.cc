@@ -149,7 +149,7 @@ class Differences {
     return layers_[static_cast<std::size_t>(p[2])].at<double>(p[1], p[0]);
   }
 
-  // Of all places and layers, the largest or the smallest of its 27.
+  // An extremum is the largest or the smallest of its 27 in place and layer.
   bool IsExtreme(const cv::Vec3i& p) const {
     for (int k = 0; k < 27; ++k) {
       const double other = At(p + cv::Vec3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));

@@ -31,7 +31,7 @@ inline cv::Mat TexturedImage(std::uint32_t seed, int width = 320, int height = 2
   return image;
 }
 
-/// The same place seen from a little further right and turned by a degree.
+/// The place is seen again from a little further right and turned by a degree.
 inline cv::Mat SeenAgain(const cv::Mat& image) {
   cv::Mat motion = cv::getRotationMatrix2D(cv::Point2f(image.cols * 0.5f, image.rows * 0.5f), 1.0, 1.03);
   motion.at<double>(0, 2) += 4.0;

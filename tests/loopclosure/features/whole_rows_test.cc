@@ -6,7 +6,7 @@
 #include <optional>
 #include <random>
 
-#include "loopclosure/store/signed_squares.h"
+#include "loopclosure/store/packed_mat.h"
 
 namespace tutti::internal {
 namespace {

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 
 namespace tutti::internal {
 namespace {
@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(WithADenseMember, MemorySystemTest, ::testing::Bool());
 
 double CountOf(const std::vector<double>& counts, int slot) { return counts[static_cast<std::size_t>(slot)]; }
 
-// Of a dense member, which compares whole sequences, it is half of that.
+// It is half of that for a dense member, which compares whole sequences.
 TEST_P(MemorySystemTest, WhatAMemberRepeatsIsItsMeanCountForThreeImagesBefore) {
   for (int image = 0; image < kImagesOfWalk; ++image) {
     See(image);

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tests/loopclosure/geometry/two_poses.h"
 #include "tests/support/plain_camera.h"
 

@@ -88,7 +88,7 @@ class TwoViews {
   static Eigen::Vector3d Nowhere() {
     return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
-  // Of matches in the same 4 x 4 px of an image the verifier counts one.
+  // The verifier counts one of the matches in the same 4 x 4 px of an image.
   bool IsAlone(const Eigen::Vector2d& in_candidate, const Eigen::Vector2d& in_query) const {
     const auto far = [](const View& view, const Eigen::Vector2d& pixel) {
       const std::vector<cv::Point2f>& others = view.members[0].pixels;
@@ -159,7 +159,7 @@ TEST(VerifierBars, AFewOfManyShowAPlaceButNoMotionAndThirtyDo) {
   EXPECT_TRUE(TwoViews().AddTrue(40, false).AddFalse(200, false).Verify().accepted) << "whatever their share";
 }
 
-// Of fewer than thirty points something else decides.
+// Something else decides about fewer than thirty points.
 TEST(VerifierBars, TooFewPointsLeaveItToThePixels) {
   EXPECT_EQ(TwoViews().AddTrue(29, true).AddTrue(40, false).Verify().type, ConstraintType::kEssential);
   EXPECT_EQ(TwoViews().AddTrue(30, true).AddTrue(40, false).Verify().type, ConstraintType::kRigid);

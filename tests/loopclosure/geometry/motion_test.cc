@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "tests/loopclosure/geometry/two_poses.h"
@@ -13,7 +12,7 @@
 namespace tutti::internal {
 namespace {
 
-// Of this focal length, an image of 640 px is taken to be where nobody knows its camera.
+// An image of 640 px is taken to have this focal length where nobody knows its camera.
 constexpr double kFocal = 0.8 * 640;
 
 std::vector<PooledMatch> PoolOf(const testing::SeenTwice& seen, const cv::Point2f& query_at = {},

@@ -122,14 +122,6 @@ TEST(SolvePnp, InformationMatchesTheScatterOfTheErrors) {
   EXPECT_LT(sum / kScenes, 9.0);
 }
 
-TEST(SolvePnp, PointNoiseLowersTheInformation) {
-  const PnpData data = MakePnp(40, 0, 0.5, 6);
-  const PnpResult sharp = SolvePnp(data.points, data.pixels, Camera(), {});
-  const PnpResult soft =
-      SolvePnp(data.points, data.pixels, Camera(), {}, std::vector<double>(data.points.size(), 0.05));
-  EXPECT_LT(soft.information(0, 0), 0.5 * sharp.information(0, 0));
-}
-
 // Second derivative of a cost around 0, by differences.
 template <int N>
 Eigen::Matrix<double, N, N> Curvature(const std::function<double(const Eigen::Matrix<double, N, 1>&)>& cost) {

@@ -78,18 +78,6 @@ TEST(GeometricVerifier, WithCalibrationAloneTheDirectionIsKnown) {
   EXPECT_NEAR(std::abs(v.S_candidate_query.translation.normalized().x()), 1.0, 0.02);
 }
 
-TEST(GeometricVerifier, AnotherPlaceIsRefusedWithAReason) {
-  const GeometricVerifier verifier({}, 1);
-  View other = See(Pose(), 1, true, true);
-  std::mt19937 generator(3);
-  for (cv::Point2f& p : other.members[0].pixels) {  // the same features, elsewhere in the image
-    p = {static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u)};
-  }
-  const Verification v = verifier.Verify(See(PoseAt(0.2, 0), 9, false, false), other);
-  EXPECT_FALSE(v.accepted);
-  EXPECT_FALSE(v.reason.empty());
-}
-
 TEST(GeometricVerifier, EvidencePartsOnePlaceFromChanceWhateverIsDecided) {
   VerificationOptions strict;
   strict.min_spread = 0.9;  // nothing is accepted
@@ -118,16 +106,6 @@ TEST(GeometricVerifier, WithMetricPointsEvidenceIsByLinesAsWithout) {
   EXPECT_LT(v.expected_inliers, 0.1 * v.matches);
   EXPECT_LT(v.log_nfa, -100);
   EXPECT_GT(v.coverage, 24);
-}
-
-TEST(GeometricVerifier, MatchesInOneSpotAreRefused) {
-  View query = See(PoseAt(0.8, 0), 9, false, false), candidate = See(Pose(), 1, false, false);
-  for (View* view : {&query, &candidate}) {
-    for (cv::Point2f& p : view->members[0].pixels)
-      p = cv::Point2f(300, 200) + (p - cv::Point2f(320, 240)) * 0.08f;
-  }
-  const Verification spot = GeometricVerifier({}, 1).Verify(query, candidate);
-  EXPECT_FALSE(spot.accepted);
 }
 
 // Descriptors of their own for features that belong to something else than the cloud.
@@ -235,7 +213,7 @@ TEST_P(Turned, OnTheSpotIsAcceptedByItsHomography) {
   }
 }
 
-// As if all points were on a plane that the camera looks at askance.
+// All points seem to be on a plane that the camera looks at askance.
 View SeeFlat(const Pose& T_world_camera, std::int64_t id, bool calibrated) {
   View view = See(Pose(), id, calibrated, false);
   View::Set& set = view.members[0];
@@ -273,14 +251,8 @@ TEST_P(Turned, ChanceIsNoHomography) {
     p = {static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u)};
   const Verification v = GeometricVerifier({}, 1).Verify(See(Pose(), 9, GetParam(), false), chance);
   EXPECT_FALSE(v.accepted);
+  EXPECT_FALSE(v.reason.empty());
   EXPECT_LT(v.inliers, 20);
-}
-
-TEST(GeometricVerifier, AMotionWithParallaxIsNoHomography) {
-  const Verification v =
-      GeometricVerifier({}, 1).Verify(See(PoseAt(0.8, 0.2), 9, false, false), See(Pose(), 1, false, false));
-  ASSERT_TRUE(v.accepted) << v.reason;
-  EXPECT_FALSE(v.homography);
 }
 
 // Two cameras, the right one's image beside the left one's; each moves in its own image.

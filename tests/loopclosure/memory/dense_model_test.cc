@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/byte_stream.h"
-#include "loopclosure/features/gradient_descriptor.h"
+#include "core/state_archive.h"
+#include "loopclosure/features/whole_image.h"
 #include "loopclosure/memory/dense_model.h"
 #include "tutti/core/error.h"
 
@@ -38,7 +38,7 @@ class PlacesByHand {
     if (!Has(a) || !Has(b)) return 0;
     return At(a)->dot(*At(b));
   }
-  // Of the image that is `back` before the newest, over the places.
+  // The mean is that of the image that is `back` before the newest, over the places.
   double Mean(const std::vector<int>& places, int back) const {
     double sum = 0;
     int known = 0;
@@ -186,11 +186,8 @@ TEST_F(DenseModelByHand, NothingStandsOutAmongFewerThanTwelve) {
 
 TEST_F(DenseModelByHand, ALoadedOneSaysTheSame) {
   model_.Remove(13);
-  internal::ByteWriter out;
-  model_.Save(out);
   DenseModel loaded;
-  internal::ByteReader in(out.bytes(), "memory");
-  loaded.Load(in);
+  internal::ReadStateBytes(internal::StateBytes(model_), "memory", loaded);
   EXPECT_EQ(loaded.Counts(places_), model_.Counts(places_));
   EXPECT_EQ(loaded.Scores(), model_.Scores());
   cv::RNG random(6);

@@ -2,9 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <functional>
 
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tests/loopclosure/detector/wall_walk.h"
 #include "tests/loopclosure/features/textured_image.h"
@@ -16,6 +15,9 @@ namespace tutti {
 namespace {
 
 constexpr int kPlaces = testing::kWallPlaces;
+
+using testing::PlacesFound;
+using testing::TwoWalks;
 
 cv::Mat Along(int place, std::uint32_t wall = 77) { return testing::AlongWall(place, wall); }
 
@@ -39,36 +41,15 @@ LoopDetectorOptions Options(const std::vector<std::string>& members) {
   return options;
 }
 
-// The wall by day, then again, each image as `again` makes it.
-std::vector<LoopResult> TwoWalks(const LoopDetectorOptions& options, int images_again,
-                                 const std::function<cv::Mat(int)>& again) {
-  LoopDetector detector(options);
-  std::vector<LoopResult> results;
-  for (int i = 0; i < kPlaces + images_again; ++i) {
-    const cv::Mat image = i < kPlaces ? Along(i) : again(i - kPlaces);
-    results.push_back(detector.Detect(image, i));
-  }
-  return results;
-}
-
-int Found(const std::vector<LoopResult>& results) {
-  int found = 0;
-  for (std::size_t i = kPlaces; i < results.size(); ++i) {
-    const bool near = std::abs(results[i].best - (results[i].query - kPlaces)) <= 1;
-    if (near && results[i].hypothesis >= 0.5) ++found;
-  }
-  return found;
-}
-
 TEST(DenseMember, FindsTheSecondLapAtNightAndTakesNothingFromTheOthers) {
   const auto night = [](int i) {
     cv::Mat large;  // so that noise is fine and shapes are not
     cv::resize(Along(i), large, cv::Size(), 3, 3);
     return AtNight(large, static_cast<std::uint64_t>(i));
   };
-  const int corners = Found(TwoWalks(Options({"surf", "sift", "orb"}), 30, night));
-  const int dense = Found(TwoWalks(Options({"hog"}), 30, night));
-  const int together = Found(TwoWalks(Options({"surf", "sift", "orb", "hog"}), 30, night));
+  const int corners = PlacesFound(TwoWalks(Options({"surf", "sift", "orb"}), 30, night));
+  const int dense = PlacesFound(TwoWalks(Options({"hog"}), 30, night));
+  const int together = PlacesFound(TwoWalks(Options({"surf", "sift", "orb", "hog"}), 30, night));
   EXPECT_GE(dense, 8);
   EXPECT_GE(corners, 20);
   EXPECT_GE(together, corners - 1);
@@ -101,14 +82,6 @@ TEST(DenseMember, CostsNothingWhereItSitsOut) {
   }
   EXPECT_GE(found_with, found_without);
   EXPECT_GE(found_without, 5);
-}
-
-TEST(DenseMember, IsTheSameForOneAndTwoThreads) {
-  LoopDetectorOptions options = Options({"orb", "hog"});
-  const auto again = [](int i) { return testing::SeenAgain(Along(i)); };
-  const std::vector<LoopResult> one = TwoWalks(options, 15, again);
-  options.threads = 2;
-  testing::ExpectEqual(one, TwoWalks(options, 15, again));
 }
 
 class SavedDense : public ::testing::TestWithParam<bool> {};
@@ -237,9 +210,6 @@ TEST(DenseMember, NaiveHasNoUseForIt) {
   options.members = {"orb", "hog"};
   options.rule = CombinationRule::kNaive;
   EXPECT_NE(options.Validate().find("'hog' has none"), std::string::npos);
-  options = LoopDetectorOptions();
-  options.dense_members = {"mine"};
-  EXPECT_NE(options.Validate().find("external_members"), std::string::npos);
 }
 
 TEST(GradientDescriptor, KnowsNoLightAndLeavesOutWhatIsMasked) {

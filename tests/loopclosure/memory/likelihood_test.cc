@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -167,18 +167,14 @@ TEST(Likelihood, OnlyWorkingMemoryEntersTheAdjustment) {
 
 TEST(Likelihood, ASavedOneWithWordsOfALocationThatIsNotThereIsRefused) {
   for (const bool present : {true, false}) {
-    internal::ByteWriter out;
-    out.Put<std::uint64_t>(1);
-    out.Put<char>(present ? 1 : 0);
-    Signature({4, 4, 9}).Save(out);
+    const std::string bytes = internal::StateBytes(std::uint64_t{1}, present, Signature({4, 4, 9}));
     LikelihoodModel model(LikelihoodKind::kTfIdf);
-    internal::ByteReader in(out.bytes(), "test");
     if (present) {
-      model.Load(in);
+      internal::ReadStateBytes(bytes, "test", model);
       EXPECT_TRUE(model.Has(0));
       EXPECT_EQ(model.signature(0).size(), 3);
     } else {
-      EXPECT_THROW(model.Load(in), InputError);
+      EXPECT_THROW(internal::ReadStateBytes(bytes, "test", model), InputError);
     }
   }
 }

@@ -5,13 +5,12 @@
 #include <limits>
 #include <map>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-using State = LocationMemory::State;
 using LinkType = LocationMemory::LinkType;
 
 TEST(LocationMemory, OldestLocationsLeaveShortTermMemoryFirst) {
@@ -21,8 +20,8 @@ TEST(LocationMemory, OldestLocationsLeaveShortTermMemoryFirst) {
     memory.Settle();
   }
   EXPECT_EQ(memory.working_memory(), (std::vector<int>{0, 1}));
-  EXPECT_EQ(memory.state(1), State::kWorking);
-  EXPECT_EQ(memory.state(2), State::kShortTerm);
+  EXPECT_EQ(memory.state(1), LocationState::kWorking);
+  EXPECT_EQ(memory.state(2), LocationState::kShortTerm);
   EXPECT_EQ(memory.Find(103), 3);
   EXPECT_EQ(memory.Find(7), -1);
 }
@@ -53,7 +52,7 @@ TEST(LocationMemory, RehearsalDropsTheNewerAndKeepsItsWeightAndName) {
   memory.Add(12);
   EXPECT_EQ(memory.DropNewest(), 1);
   EXPECT_EQ(memory.weight(1), 1);
-  EXPECT_EQ(memory.state(2), State::kMerged);
+  EXPECT_EQ(memory.state(2), LocationState::kMerged);
   EXPECT_EQ(memory.Find(12), 1);
   memory.Add(13);
   ASSERT_EQ(memory.links(3).size(), 1u);
@@ -65,7 +64,7 @@ TEST(LocationMemory, NothingToRehearseInAnEmptyShortTermMemory) {
   EXPECT_EQ(memory.DropNewest(), -1);
   memory.Add(1);
   EXPECT_EQ(memory.DropNewest(), -1);
-  EXPECT_EQ(memory.state(0), State::kShortTerm);
+  EXPECT_EQ(memory.state(0), LocationState::kShortTerm);
 }
 
 TEST(LocationMemory, ALoopHandsTheWeightOn) {
@@ -180,7 +179,7 @@ TEST(LocationMemory, LongTermNeighboursAreFoundAcrossLongTermMemory) {
   LocationMemory memory = ShortChain();
   for (const int slot : {3, 4, 5}) EXPECT_TRUE(memory.Transfer(slot));
   EXPECT_FALSE(memory.Transfer(3));
-  EXPECT_EQ(memory.state(4), State::kLongTerm);
+  EXPECT_EQ(memory.state(4), LocationState::kLongTerm);
   EXPECT_EQ(memory.num_long_term(), 3);
   EXPECT_EQ(memory.LongTermNeighbours(2, 10, 2), (std::vector<int>{3, 4}));
   EXPECT_EQ(memory.LongTermNeighbours(7, 1, 2), std::vector<int>{});
@@ -204,46 +203,45 @@ TEST(LocationMemory, AnIgnoredLocationLeavesNoWeight) {
 
 struct Record {
   std::int64_t id;
-  State state;
+  LocationState state;
   int weight;
   std::int64_t entered;
   int names;
+  std::vector<LocationMemory::Link> links = {};
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(id, state, weight, entered, names, links);
+  }
 };
 
 int LoadedSize(const std::vector<Record>& records) {
-  internal::ByteWriter out;
-  out.Put<std::int32_t>(static_cast<std::int32_t>(records.size()));
-  for (const Record& record : records) {
-    out.Put(record.id);
-    out.Put(record.state);
-    out.Put<std::int32_t>(record.weight);
-    out.Put(record.entered);
-    out.Put<std::int32_t>(record.names);
-    out.Put<std::uint64_t>(0);  // links
-  }
+  std::string bytes = internal::StateBytes(static_cast<int>(records.size()));
+  for (const Record& record : records) bytes += internal::StateBytes(record);
   LocationMemory memory(2);
-  internal::ByteReader in(out.bytes(), "test");
-  memory.Load(in);
+  internal::ReadStateBytes(bytes, "test", memory);
   return memory.size();
 }
 
 TEST(LocationMemory, WhatNoMemoryWouldHaveSavedIsRefused) {
-  const std::vector<Record> good = {
-      {10, State::kWorking, 1, 0, 0}, {11, State::kMerged, 0, 0, 0}, {12, State::kShortTerm, 0, 0, 2}};
+  const std::vector<Record> good = {{10, LocationState::kWorking, 1, 0, 0},
+                                    {11, LocationState::kMerged, 0, 0, 0},
+                                    {12, LocationState::kShortTerm, 0, 0, 2}};
   EXPECT_EQ(LoadedSize(good), 3);
   const auto refused = [&](std::size_t i, const Record& record) {
     std::vector<Record> records = good;
     records[i] = record;
     EXPECT_THROW(LoadedSize(records), InputError) << "record " << i << ", id " << record.id;
   };
-  refused(0, {-1, State::kWorking, 1, 0, 0});                                         // a negative id
-  refused(0, {11, State::kWorking, 1, 0, 0});                                         // an id twice
-  refused(0, {10, State::kWorking, -1, 0, 0});                                        // less than no weight
-  refused(0, {10, State::kWorking, std::numeric_limits<int>::max(), 0, 0});           // more than all weigh
-  refused(0, {10, State::kWorking, 1, std::numeric_limits<std::int64_t>::max(), 0});  // entries overflow
-  refused(1, {11, State::kMerged, 0, 0, 1});                                          // merged into itself
-  refused(1, {11, State::kWorking, 0, 0, 0});  // not merged, but another's
-  refused(2, {12, State::kMerged, 0, 0, 1});   // into a merged one
+  refused(0, {-1, LocationState::kWorking, 1, 0, 0});                                // a negative id
+  refused(0, {11, LocationState::kWorking, 1, 0, 0});                                // an id twice
+  refused(0, {10, LocationState::kWorking, -1, 0, 0});                               // less than no weight
+  refused(0, {10, LocationState::kWorking, std::numeric_limits<int>::max(), 0, 0});  // more than all weigh
+  refused(0,
+          {10, LocationState::kWorking, 1, std::numeric_limits<std::int64_t>::max(), 0});  // entries overflow
+  refused(1, {11, LocationState::kMerged, 0, 0, 1});   // merged into itself
+  refused(1, {11, LocationState::kWorking, 0, 0, 0});  // not merged, but another's
+  refused(2, {12, LocationState::kMerged, 0, 0, 1});   // into a merged one
 }
 
 TEST(LocationMemory, AMergedLocationHandsLinksWeightAndNamesToAnOlderOne) {
@@ -256,7 +254,7 @@ TEST(LocationMemory, AMergedLocationHandsLinksWeightAndNamesToAnOlderOne) {
   EXPECT_FALSE(memory.CanMerge(6, 1)) << "the newest stays";
   ASSERT_TRUE(memory.CanMerge(4, 1));
   memory.Merge(4, 1);
-  EXPECT_EQ(memory.state(4), State::kMerged);
+  EXPECT_EQ(memory.state(4), LocationState::kMerged);
   EXPECT_EQ(memory.Find(14), 1);
   EXPECT_EQ(memory.weight(1), 1);
   const std::vector<LocationMemory::Neighbour> near = {{1, 0, 0}, {0, 1, 0}, {2, 1, 0}, {3, 1, 0}};
@@ -268,11 +266,8 @@ TEST(LocationMemory, AMergedLocationHandsLinksWeightAndNamesToAnOlderOne) {
   EXPECT_FALSE(memory.CanMerge(3, 1)) << "that is no longer there";
   memory.Merge(5, 0);  // of short-term memory
   EXPECT_EQ(memory.short_term_memory(), (std::deque<int>{6}));
-  internal::ByteWriter out;
-  memory.Save(out);
   LocationMemory again(2);
-  internal::ByteReader in(out.bytes(), "it");
-  again.Load(in);
+  internal::ReadStateBytes(internal::StateBytes(memory), "it", again);
   EXPECT_EQ(again.Find(14), 0);
   EXPECT_EQ(again.working_memory(), (std::vector<int>{0, 2, 3}));
   EXPECT_EQ(again.short_term_memory(), (std::deque<int>{6}));

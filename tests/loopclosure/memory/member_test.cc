@@ -4,9 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <initializer_list>
-#include <string>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 
 namespace tutti {
 namespace {
@@ -47,11 +46,7 @@ TEST(Member, AnImageWithFewerThanItsShareOfTheMeanIsBad) {
 TEST(Member, TheMeanIsSavedWithIt) {
   Member member = OrbMember(0.5), again = OrbMember(0.5);
   EXPECT_TRUE(member.Judge(WithKeypoints(100)));
-  internal::ByteWriter out;
-  member.SaveStatistics(out);
-  internal::ByteReader in(out.bytes(), "test");
-  again.LoadStatistics(in);
-  EXPECT_TRUE(in.AtEnd());
+  internal::ReadStateBytes(internal::StateBytes(member), "test", again);
   EXPECT_FALSE(again.Judge(WithKeypoints(30)));
   EXPECT_TRUE(OrbMember(0.5).Judge(WithKeypoints(30)));
 }

@@ -8,22 +8,17 @@
 #include <cstdint>
 #include <string>
 
-#include "loopclosure/store/signed_squares.h"
+#include "core/state_archive.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
 namespace {
 
-std::string BytesOfMat(const cv::Mat& matrix) {
-  ByteWriter out;
-  PackedMat(matrix).Put(out);
-  return std::string(out.bytes());
-}
+std::string BytesOfMat(const cv::Mat& matrix) { return StateBytes(PackedMat(matrix)); }
 
 cv::Mat MatOf(const std::string& bytes) {
-  ByteReader in(bytes, "test");
-  const PackedMat packed = PackedMat::Get(in);
-  EXPECT_EQ(in.Left(), 0u);
+  PackedMat packed;
+  ReadStateBytes(bytes, "test", packed);
   return packed.Unpacked();
 }
 
@@ -132,23 +127,19 @@ TEST(PackedMat, DamagedOnesAreRefused) {
   for (const cv::Mat& matrix : {bytes, RandomMat(3, 5, CV_32F, -1, 1), steps}) {
     const std::string good = BytesOfMat(matrix);
     for (std::size_t length = 0; length < good.size(); ++length) {
-      const std::string cut = good.substr(0, length);
-      ByteReader in(cut, "test");
-      EXPECT_THROW(PackedMat::Get(in), InputError) << length << " of " << good.size();
+      EXPECT_THROW(MatOf(good.substr(0, length)), InputError) << length << " of " << good.size();
     }
     // Kind, then rows and columns in four bytes each.
     for (const std::size_t at : {1u, 5u}) {
       for (const char value : {'\0', '\xff'}) {
         std::string bad = good;
         for (std::size_t k = 0; k < 4; ++k) bad[at + k] = value;
-        ByteReader in(bad, "test");
-        EXPECT_THROW(PackedMat::Get(in), InputError);
+        EXPECT_THROW(MatOf(bad), InputError);
       }
     }
     std::string unknown = good;
     unknown[0] = 5;
-    ByteReader in(unknown, "test");
-    EXPECT_THROW(PackedMat::Get(in), InputError);
+    EXPECT_THROW(MatOf(unknown), InputError);
   }
 }
 

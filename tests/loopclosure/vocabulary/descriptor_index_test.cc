@@ -3,14 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numeric>
 #include <random>
 #include <utility>
 #include <vector>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/store/packed_mat.h"
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 
@@ -191,10 +190,14 @@ TEST(DescriptorIndex, SavedOnesAnswerAndForgetAsBefore) {
     };
     const std::unique_ptr<DescriptorIndex> index = make(), again = make();
     index->Add(Ids(0, rows.rows), rows);
-    internal::ByteWriter saved;
-    index->Save({rows}, saved);
-    internal::ByteReader in(saved.bytes(), "test");
-    again->Load({rows}, in);
+    internal::SharedObjectsOut no_objects;
+    internal::StateWriter out(&no_objects);
+    index->State(out, {rows});
+    const std::string bytes_of_index = out.Take();
+    internal::SharedObjectsIn none;
+    internal::StateReader in(bytes_of_index, "test", &none);
+    again->State(in, {rows});
+    in.ExpectEnd();
     const auto expect_the_same = [&] {
       const std::vector<TwoNearest> expected = index->Search(rows), found = again->Search(rows);
       for (std::size_t i = 0; i < found.size(); ++i) {

@@ -17,7 +17,7 @@ inline cv::Mat RandomFloats(int rows, int columns, std::uint32_t seed) {
   return m;
 }
 
-/// Of 32 bytes.
+/// Each row is a descriptor of 32 bytes.
 inline cv::Mat RandomBytes(int rows, std::uint32_t seed) {
   std::mt19937 generator(seed);
   cv::Mat m(rows, 32, CV_8U);

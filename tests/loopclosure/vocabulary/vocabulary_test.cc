@@ -2,11 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <numeric>
-#include <random>
-
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/store/packed_mat.h"
+#include "loopclosure/vocabulary/signature.h"
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 #include "tutti/core/error.h"
 
@@ -150,16 +148,21 @@ TEST(Vocabulary, SearchStaysGoodWhileWordsComeAndGo) {
   }
 }
 
+std::string Saved(Vocabulary& vocabulary, const std::vector<internal::PackedMat>& known = {}) {
+  return internal::StateBytes(Vocabulary::Beside{&vocabulary, known});
+}
+
+void Load(const std::string& bytes, Vocabulary* vocabulary,
+          const std::vector<internal::PackedMat>& known = {}) {
+  internal::ReadStateBytes(bytes, "saved", Vocabulary::Beside{vocabulary, known});
+}
+
 TEST(Vocabulary, ALoadedOneGoesOnAsTheSavedOneWould) {
   for (const bool binary : {false, true}) {
     Churn churn(binary);
     for (int i = 0; i < 77; ++i) churn.Step();
-    internal::ByteWriter out;
-    churn.vocabulary_.Save({}, out);
     Vocabulary loaded(VocabularyOptions(), 3);
-    internal::ByteReader in(out.bytes(), "saved");
-    loaded.Load({}, in);
-    EXPECT_TRUE(in.AtEnd());
+    Load(Saved(churn.vocabulary_), &loaded);
     for (std::uint32_t seed = 60; seed < 130; ++seed) {
       const cv::Mat rows = binary ? RandomBytes(40, seed) : RandomFloats(40, 32, seed);
       const std::vector<int> words = churn.vocabulary_.Quantise(rows);
@@ -169,10 +172,7 @@ TEST(Vocabulary, ALoadedOneGoesOnAsTheSavedOneWould) {
       churn.vocabulary_.RemoveReferences(Signature(words));
       loaded.RemoveReferences(Signature(words));
     }
-    internal::ByteWriter a, b;
-    churn.vocabulary_.Save({}, a);
-    loaded.Save({}, b);
-    EXPECT_TRUE(a.bytes() == b.bytes());
+    EXPECT_TRUE(Saved(churn.vocabulary_) == Saved(loaded));
   }
 }
 
@@ -182,36 +182,46 @@ TEST(Vocabulary, WordsThatAreKnownAnywayTakeFewBytes) {
     for (int i = 0; i < 20; ++i) churn.Step();
     std::vector<internal::PackedMat> known;
     for (const auto& [descriptors, signature] : churn.images_) known.emplace_back(descriptors.clone());
-    internal::ByteWriter alone, with;
-    churn.vocabulary_.Save({}, alone);
-    churn.vocabulary_.Save(known, with);
-    EXPECT_LT(with.bytes().size() + 20 * static_cast<std::size_t>(churn.vocabulary_.size()),
-              alone.bytes().size());
-    Vocabulary loaded(VocabularyOptions(), 3);
-    internal::ByteReader in(with.bytes(), "saved");
-    loaded.Load(known, in);
-    EXPECT_TRUE(in.AtEnd());
-    internal::ByteWriter again;
-    loaded.Save({}, again);
-    EXPECT_TRUE(again.bytes() == alone.bytes());
+    const std::string alone = Saved(churn.vocabulary_), with = Saved(churn.vocabulary_, known);
+    EXPECT_LT(with.size() + 20 * static_cast<std::size_t>(churn.vocabulary_.size()), alone.size());
+    Vocabulary loaded(VocabularyOptions(), 3), other(VocabularyOptions(), 3);
+    Load(with, &loaded, known);
+    EXPECT_TRUE(Saved(loaded) == alone);
     known.pop_back();
-    Vocabulary other(VocabularyOptions(), 3);
-    internal::ByteReader in_again(with.bytes(), "saved");
-    EXPECT_THROW(other.Load(known, in_again), InputError);
+    EXPECT_THROW(Load(with, &other, known), InputError);
   }
 }
 
 TEST(Vocabulary, DamagedBytesAreRefused) {
   Churn churn(false);
   for (int i = 0; i < 3; ++i) churn.Step();
-  internal::ByteWriter out;
-  churn.vocabulary_.Save({}, out);
-  const std::string& bytes = out.bytes();
+  const std::string bytes = Saved(churn.vocabulary_);
   for (std::size_t length = 0; length < bytes.size(); length += 1 + bytes.size() / 50) {
     Vocabulary loaded(VocabularyOptions(), 3);
-    internal::ByteReader in(std::string_view(bytes).substr(0, length), "saved");
-    EXPECT_THROW(loaded.Load({}, in), InputError) << length;
+    EXPECT_THROW(Load(bytes.substr(0, length), &loaded), InputError) << length;
   }
+}
+
+TEST(Signature, CountsEachWordInAscendingOrder) {
+  const Signature s({7, 3, 7, 1});
+  ASSERT_EQ(s.entries().size(), 3u);
+  EXPECT_EQ(s.entries()[0].word, 1);
+  EXPECT_EQ(s.entries()[2].word, 7);
+  EXPECT_EQ(s.entries()[2].count, 2);
+  EXPECT_EQ(s.size(), 4);
+}
+
+TEST(Signature, SimilarityIsSharedMultiplicityOverTheLargerSize) {
+  const Signature a({1, 1, 2, 3});
+  const Signature b({1, 1, 1, 2, 9});
+  EXPECT_DOUBLE_EQ(Signature::Similarity(a, b), 3.0 / 5.0);
+  EXPECT_DOUBLE_EQ(Signature::Similarity(b, a), 3.0 / 5.0);
+  EXPECT_DOUBLE_EQ(Signature::Similarity(a, a), 1.0);
+}
+
+TEST(Signature, AnEmptySignatureIsLikeNothing) {
+  EXPECT_EQ(Signature::Similarity(Signature(), Signature({1})), 0.0);
+  EXPECT_EQ(Signature::Similarity(Signature(), Signature()), 0.0);
 }
 
 }  // namespace

@@ -210,7 +210,7 @@ class LoopDetector {
   /// Adds the image as a location and says whether it closes a loop. Never throws for hard images; throws
   /// InputError for misuse (an id that does not grow, descriptors of another type than before).
   LoopResult Detect(const LoopQuery& query);
-  /// The same for an image alone: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1.
+  /// Detects in an image alone: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1.
   LoopResult Detect(const cv::Mat& image, std::int64_t id);
 
   /// Says at which location in working memory an image was taken, for a camera that has lost its way: by
@@ -263,7 +263,7 @@ class LoopDetector {
   std::size_t NumLongTerm() const;
   /// The last id that Detect was given; -1 if there was none.
   std::int64_t LastId() const;
-  /// As given; after Load with the saved detector's seed.
+  /// What was given; after Load with the saved detector's seed.
   const LoopDetectorOptions& options() const;
 
  private:

@@ -233,9 +233,8 @@ struct LoopDetectorOptions {
 /// A published set of parameters (loop-closure.md section 9) on top of `options`: "paper-2013" (Labbe &
 /// Michaud 2013), "rtabmap-0.8.3" (the reference system of the ensemble's paper), "standardised-mean" (the
 /// ensemble's paper: standardised evidence, mean of the posteriors, every loop that geometry accepts), or
-/// "default" (ours).
-/// Features (but their number) and verification (but min_epipolar_ratio) stay as they are. Throws InputError
-/// that names the nearest word.
+/// "default" (ours). Features (but their number) and verification (but min_epipolar_ratio) stay as they are.
+/// Throws InputError that names the nearest word.
 void ApplyPreset(const std::string& name, LoopDetectorOptions& options);
 
 /// Names that ApplyPreset takes.

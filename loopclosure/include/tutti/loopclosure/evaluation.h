@@ -125,7 +125,7 @@ LoopObservation Observe(const LoopResult& result);
 /// Makes the result of an image what was decided later (LoopResult::late of another image's result): figures
 /// are of final decisions. Returns false, and nothing changes, where the decision stays.
 bool TakeLate(const LateLoop& late, LoopResult* result);
-/// The same for what Observe has made of it.
+/// Does so for what Observe has made of it.
 bool TakeLate(const LateLoop& late, LoopObservation* observation);
 
 }  // namespace tutti

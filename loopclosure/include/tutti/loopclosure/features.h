@@ -54,9 +54,6 @@ using FeatureFactory = std::function<cv::Ptr<cv::Feature2D>(cv::Size image_size,
 /// if the name is empty or taken.
 void RegisterFeatureType(const std::string& name, FeatureFactory factory);
 
-/// Names that were registered, in order.
-std::vector<std::string> RegisteredFeatureTypes();
-
 /// Detects and describes with one cv::Feature2D, named as in LoopDetectorOptions::members.
 class FeatureExtractor {
  public:
@@ -68,11 +65,11 @@ class FeatureExtractor {
   Features Extract(const cv::Mat& grey) const;
 
  private:
-  cv::Ptr<cv::Feature2D> Create(cv::Size size) const;
   double Shrinking(double pixels) const;  // by which the member sees the image smaller; below 1: larger
 
   std::string name_;
   ExtractionOptions options_;
+  FeatureFactory factory_;                                // of all but surf, sift and orb
   cv::Ptr<cv::Feature2D> surf_;                           // copies share it, and the scratches
   std::shared_ptr<internal::SiftScratchPool> scratches_;  // of sift
 };

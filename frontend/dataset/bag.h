@@ -6,12 +6,16 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "frontend/dataset/ros_message.h"
 
 namespace tutti {
+
+constexpr std::string_view kRosBagMagic = "#ROSBAG V2.0\n",
+                           kMcapMagic = "\x89MCAP0\r\n";  ///< beginnings of files
 
 constexpr std::uint32_t kMostMessageBytes = 1U << 29U;  ///< and those of an unpacked chunk: 537 MB
 
@@ -88,5 +92,11 @@ class Bag {
   std::vector<Topic> topics_;
   std::string damage_;
 };
+
+/// Files of one format, which begin with its magic. Throw InputError where the file can't be opened, is
+/// encrypted, or has not the tables of 'ros2 bag record'.
+std::unique_ptr<Bag> OpenRosBag(const std::filesystem::path& file);
+std::unique_ptr<Bag> OpenMcapBag(const std::filesystem::path& file);
+std::unique_ptr<Bag> OpenSqliteBag(const std::filesystem::path& file);
 
 }  // namespace tutti

@@ -35,10 +35,22 @@ ImageFile ReadGreyFile(const std::filesystem::path& file);
 ImageFile ReadColourFile(const std::filesystem::path& file);
 /// The same as cv::imread with these flags gives it.
 ImageFile ReadImageFile(const std::filesystem::path& file, int flags);
-/// The same of the bytes of such a file.
+/// The same of the bytes of such a file; messages do not name it.
 ImageFile DecodeImage(const std::vector<unsigned char>& bytes, int flags);
-/// Reads a depth image as stored: one channel of 16 bit or float, of an image file or NumPy's (.npy: two
-/// dimensions, of float16, float32, float64 or uint16). `float_in_png`: 4 channels of 8 bit are a float.
+/// NumPy's array (.npy), a depth image: of two dimensions (or three, of which one is 1) in C order. float16,
+/// float32 and float64 become CV_32FC1, uint16 CV_16UC1.
+ImageFile DecodeNpy(const std::vector<unsigned char>& bytes);
+
+/// How large an image says it is, without decoding it.
+struct ClaimedSize {
+  std::uint64_t width = 0, height = 0;  ///< [px]
+};
+/// From the header of PNG, JPEG, BMP, PNM, TIFF, WebP (extended) and JPEG 2000; nothing of other bytes, or
+/// where the header is cut off.
+std::optional<ClaimedSize> SizeInHeader(const std::vector<unsigned char>& bytes);
+
+/// Reads a depth image as stored: one channel of 16 bit or float, of an image file or NumPy's.
+/// `float_in_png`: 4 channels of 8 bit are a float.
 ImageFile ReadDepthFile(const std::filesystem::path& file, bool float_in_png = false);
 
 /// Writes an image as a PNG file, as cv::imwrite does with these parameters. Throws InputError.

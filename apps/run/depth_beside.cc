@@ -5,7 +5,7 @@
 
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/layout.h"
-#include "frontend/dataset/turned_dataset.h"
+#include "frontend/dataset/wrapped_dataset.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

@@ -6,8 +6,7 @@
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/rectified_rig.h"
-#include "frontend/dataset/selected_dataset.h"
-#include "frontend/dataset/turned_dataset.h"
+#include "frontend/dataset/wrapped_dataset.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -313,7 +312,7 @@ std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const Da
     use.mirrored_ground_truth = true;
   }
   std::unique_ptr<Dataset> whole = OpenWhole(path, use);
-  if (use.rotate != 0) whole = std::make_unique<TurnedDataset>(std::move(whole), use.rotate, path.string());
+  if (use.rotate != 0) whole = TurnFrames(std::move(whole), use.rotate, path.string());
   return SelectFrames(std::move(whole), use, path.string());
 }
 

@@ -11,7 +11,7 @@
 #include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/ros_message.h"
-#include "frontend/dataset/video_input.h"
+#include "frontend/dataset/video_decoder.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

@@ -10,7 +10,6 @@
 #include "core/stopwatch.h"
 #include "frontend/dataset/camera_input.h"
 #include "frontend/dataset/dataset_folder.h"
-#include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

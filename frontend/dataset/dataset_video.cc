@@ -9,7 +9,6 @@
 #include "core/text_reader.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/video_decoder.h"
-#include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

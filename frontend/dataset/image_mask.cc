@@ -62,4 +62,10 @@ cv::Mat ImageMasks::OfAll(cv::Size size) const {
   return single_;
 }
 
+cv::Mat MaskOfAll(const DatasetOptions& options, cv::Size size, const std::optional<Rectifier>& rectifier) {
+  if (options.mask.empty()) return {};
+  const cv::Mat mask = ImageMasks(options.mask).OfAll(size);
+  return rectifier ? rectifier->Apply(mask, Sampling::kNearest) : mask;
+}
+
 }  // namespace tutti

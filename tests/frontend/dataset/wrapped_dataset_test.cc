@@ -1,5 +1,5 @@
 // Cameras that were not upright.
-#include "frontend/dataset/turned_dataset.h"
+#include "frontend/dataset/wrapped_dataset.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

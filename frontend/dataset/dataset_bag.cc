@@ -24,32 +24,26 @@ constexpr double kRosUnits = 1000;  // of 16-bit depth: millimetres (REP 118)
 
 using Messages = std::vector<BagMessage>;
 
-class BagDataset : public Dataset {
+class BagDataset : public RecordedDataset {
  public:
   BagDataset(const fs::path& file, const DatasetOptions& options)
-      : file_(file), options_(options), bag_(Bag::Open(file)) {
+      : RecordedDataset(file.string(), options), bag_(Bag::Open(file)) {
     FindTopics();
     Index();
     if (!bag_->damage().empty()) warnings_.push_back(bag_->damage());
-    SetUpRig();
+    FindRig();
   }
 
   std::size_t Size() const override { return frames_.size(); }
   double Stamp(std::size_t i) const override { return frames_.at(i).image->stamp_s; }
   double SkippedShare() const override { return skipped_share_; }
-  const CameraRig& Rig() const override { return rig_.rig; }
-  std::optional<fs::path> GroundTruthFile() const override { return std::nullopt; }
-  const std::vector<std::string>& Warnings() const override { return warnings_; }
-  Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
-    return ReadTrajectory(file, GuessTrajectoryFormat(file), warnings);
-  }
 
   ColourImage ReadColour(std::size_t i) const override {
     ColourImage result;
     try {
       result.image = ToColour(ReadPixels(*frames_.at(i).image, options_.topic, Pixels::kColour, rig_.left));
     } catch (const std::exception& e) {
-      result.error = About(i) + e.what();
+      result.error = About(i) + ": " + e.what();
     }
     return result;
   }
@@ -66,7 +60,7 @@ class BagDataset : public Dataset {
       result.depth_error = AddDepth(at, i, &frame);
       result.frame = std::move(frame);
     } catch (const std::exception& e) {
-      result.error = About(i) + e.what();
+      result.error = About(i) + ": " + e.what();
     }
     return result;
   }
@@ -76,8 +70,6 @@ class BagDataset : public Dataset {
     const BagMessage *image = nullptr, *right = nullptr, *depth = nullptr;
   };
 
-  std::string About(std::size_t i) const { return file_.string() + ": frame " + std::to_string(i) + ": "; }
-
   // The depth or right image, if there is one; or what is wrong with it.
   std::string AddDepth(const Frame& at, std::size_t i, InputFrame* frame) const {
     try {
@@ -86,7 +78,8 @@ class BagDataset : public Dataset {
       if (at.depth != nullptr) frame->depth_m = ReadDepth(*at.depth);
       return {};
     } catch (const std::exception& e) {
-      return About(i) + (at.depth != nullptr ? options_.depth_topic : options_.right_topic) + ": " + e.what();
+      return About(i) + ": " + (at.depth != nullptr ? options_.depth_topic : options_.right_topic) + ": " +
+             e.what();
     }
   }
 
@@ -100,14 +93,14 @@ class BagDataset : public Dataset {
       list += " " + topic.name;
     }
     if (images.empty()) {
-      throw InputError(file_.string() + ": holds no topic of sensor_msgs/Image or CompressedImage" +
+      throw InputError(name_ + ": holds no topic of sensor_msgs/Image or CompressedImage" +
                        (bag_->damage().empty() ? "" : "; it is damaged (" + bag_->damage() + ")"));
     }
     if (options_.topic.empty() && images.size() == 1) options_.topic = images.front();
     const auto check = [&](const char* key, const std::string& topic) {
       if (std::find(images.begin(), images.end(), topic) != images.end()) return;
       throw InputError(
-          file_.string() + ": " +
+          name_ + ": " +
           (topic.empty() ? std::string("which images? Set ") : "has no images of '" + topic + "'; set ") +
           "dataset." + key + " to one of:" + list);
     };
@@ -128,7 +121,7 @@ class BagDataset : public Dataset {
                    messages.end());
     const std::size_t all = stored + bag_->Lost(topic);
     if (messages.size() < all) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(all - messages.size()) + " of " +
+      warnings_.push_back(name_ + ": " + std::to_string(all - messages.size()) + " of " +
                           std::to_string(all) + " images of " + topic + " can't be read and are skipped");
     }
     return messages;
@@ -159,7 +152,7 @@ class BagDataset : public Dataset {
     const auto constant =
         std::find_if(all.begin(), all.end(), [](const auto& one) { return StampsAreConstant(*one.first); });
     if (constant == all.end()) return;
-    warnings_.push_back(file_.string() + ": all images of " + *constant->second +
+    warnings_.push_back(name_ + ": all images of " + *constant->second +
                         " have the same stamp in their headers (" +
                         std::to_string(constant->first->front().stamp_s) +
                         " s); the times at which they were recorded are used");
@@ -173,12 +166,11 @@ class BagDataset : public Dataset {
     Messages kept;
     for (const BagMessage& m : messages) {
       if (!kept.empty() && m.stamp_s < kept.back().stamp_s)
-        throw InputError(
-            StampsJumpBack(file_.string() + ": " + topic, kept.size(), kept.back().stamp_s, m.stamp_s));
+        throw InputError(StampsJumpBack(name_ + ": " + topic, kept.size(), kept.back().stamp_s, m.stamp_s));
       if (kept.empty() || m.stamp_s > kept.back().stamp_s) kept.push_back(m);
     }
     if (kept.size() < messages.size()) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(messages.size() - kept.size()) + " of " +
+      warnings_.push_back(name_ + ": " + std::to_string(messages.size() - kept.size()) + " of " +
                           std::to_string(messages.size()) + " images of " + topic +
                           " repeat a time stamp and are skipped");
     }
@@ -219,13 +211,13 @@ class BagDataset : public Dataset {
     if (options_.sensor == Sensor::kMono) return;
     const std::string what = options_.sensor == Sensor::kRgbd ? "depth" : "right";
     if (alone == frames_.size()) {
-      throw InputError(file_.string() + ": no image of " + options_.topic + " has its " + what +
+      throw InputError(name_ + ": no image of " + options_.topic + " has its " + what +
                        " image near it in time");
     }
     if (alone > 0) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(alone) + " of " +
-                          std::to_string(frames_.size()) + " images of " + options_.topic + " have no " +
-                          what + " image near them in time and are tracked without");
+      warnings_.push_back(name_ + ": " + std::to_string(alone) + " of " + std::to_string(frames_.size()) +
+                          " images of " + options_.topic + " have no " + what +
+                          " image near them in time and are tracked without");
     }
   }
 
@@ -243,7 +235,7 @@ class BagDataset : public Dataset {
     try {
       CameraInfo info = DecodeCameraInfo(bag_->Read(infos.front()), found->serialization, "the bag");
       if (!info.IsCalibrated()) return std::nullopt;
-      std::string note = file_.string() + ": calibration of " + topic;
+      std::string note = name_ + ": calibration of " + topic;
       if (OfRectified(images) && info.P[0] > 0) note += ", P, as the images are rectified";
       if (!info.window.IsWhole()) {
         // Drivers that do not follow REP 104 state the size, and K, of the images that they send.
@@ -254,7 +246,7 @@ class BagDataset : public Dataset {
       warnings_.push_back(note);
       return info;
     } catch (const InputError& e) {
-      throw InputError(file_.string() + ": " + topic + ": " + e.what());
+      throw InputError(name_ + ": " + topic + ": " + e.what());
     }
   }
 
@@ -264,7 +256,7 @@ class BagDataset : public Dataset {
   }
 
   PinholeCamera CameraOf(const CameraInfo& info, const std::string& images) const {
-    const std::string source = file_.string() + ": camera_info of " + images;
+    const std::string source = name_ + ": camera_info of " + images;
     return Windowed(OfRectified(images) && info.P[0] > 0 ? info.Rectified() : info.Raw(source), info.window,
                     source);
   }
@@ -280,7 +272,7 @@ class BagDataset : public Dataset {
     if (!right || !(left->P[0] > 0) || !(right->P[0] > 0)) return;  // RectifyRig says what is missing
     const double baseline_m = left->P[3] / left->P[0] - right->P[3] / right->P[0];
     if (baseline_m < 0)
-      throw InputError(file_.string() + ": P of the camera_infos says that " + options_.right_topic +
+      throw InputError(name_ + ": P of the camera_infos says that " + options_.right_topic +
                        " is the left camera; exchange dataset.topic and right_topic");
     if (OfRectified(options_.topic)) {
       options_.baseline_m = baseline_m;
@@ -292,26 +284,25 @@ class BagDataset : public Dataset {
       for (std::size_t i = 0; i < options_.T_right_left.size(); ++i)
         options_.T_right_left[i] = T(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
     } catch (const InputError& e) {
-      throw InputError(file_.string() + ": R of the camera_infos " + e.what() +
+      throw InputError(name_ + ": R of the camera_infos " + e.what() +
                        "; give both cameras with --calibration");
     }
     options_.right = CameraOf(*right, options_.right_topic);
   }
 
-  void SetUpRig() {
+  // From the first image that can be read.
+  void FindRig() {
     MessageImage first;
     for (std::size_t i = 0; i < std::min<std::size_t>(50, frames_.size()) && first.image.empty(); ++i)
       first = Decode(*frames_[i].image, options_.topic, Pixels::kGrey);
     if (first.image.empty())
-      throw InputError(file_.string() + ": none of the first images can be read: " + first.error);
+      throw InputError(name_ + ": none of the first images can be read: " + first.error);
     size_ = first.image.size();
     range_ = RangeOf({first.image});
-    if (range_.narrow) warnings_.push_back(file_.string() + ": " + RangeText(range_));
+    if (range_.narrow) warnings_.push_back(name_ + ": " + RangeText(range_));
     FindCameras();
     const double span = Stamp(frames_.size() - 1) - Stamp(0);
-    const double rate = span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0;
-    rig_ = RectifyRig(file_.string(), options_, size_, rate, warnings_);
-    mask_ = MaskOfAll(options_, size_, rig_.left);
+    SetUpRig(span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0);
   }
 
   MessageImage Decode(const BagMessage& message, const std::string& topic, Pixels pixels) const {
@@ -351,14 +342,8 @@ class BagDataset : public Dataset {
     return rig_.left ? rig_.left->Apply(depth, Sampling::kNearest) : depth;
   }
 
-  fs::path file_;
-  DatasetOptions options_;
   double skipped_share_ = 0;
-  RectifiedRig rig_;
-  cv::Size size_;
   GreyRange range_;
-  std::vector<std::string> warnings_;
-  cv::Mat mask_;  // rectified; empty: none
   std::unique_ptr<Bag> bag_;
   Messages images_, right_, depth_;
   std::vector<Frame> frames_;

@@ -17,11 +17,10 @@ namespace {
 
 constexpr const char* kPrefix = "camera:";
 
-class CameraDataset : public Dataset {
+class CameraDataset : public RecordedDataset {
  public:
   CameraDataset(const std::string& name, const DatasetOptions& options)
-      : name_(name),
-        options_(options),
+      : RecordedDataset(name, options),
         device_(IsCameraDevice(name)),
         first_(Open(0)),
         second_(CameraSources(name).size() > 1 ? std::make_optional(Open(1)) : std::nullopt) {
@@ -41,8 +40,7 @@ class CameraDataset : public Dataset {
     CheckFirst(frames_.at(0));
     if (first_.Video() != nullptr)
       options_.camera = CameraOfVideo(name_, *first_.Video(), options_, size_, warnings_);
-    rig_ = RectifyRig(name_, options_, size_, rate_hz_, warnings_);
-    mask_ = MaskOfAll(options_, size_, rig_.left);
+    SetUpRig(rate_hz_);
   }
 
   Supply FrameSupply() const override { return Supply::kOnce; }
@@ -60,14 +58,7 @@ class CameraDataset : public Dataset {
     }
     return true;
   }
-  const CameraRig& Rig() const override { return rig_.rig; }
   int TurnedBy() const override { return first_.Video() != nullptr ? first_.Video()->TurnedBy() : 0; }
-  std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
-  const std::vector<std::string>& Warnings() const override { return warnings_; }
-  Trajectory ReadGroundTruth(const std::filesystem::path& file,
-                             std::vector<std::string>* warnings) const override {
-    return ReadTrajectory(file, GuessTrajectoryFormat(file), warnings);
-  }
 
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
@@ -95,7 +86,6 @@ class CameraDataset : public Dataset {
  private:
   bool SideBySide() const { return options_.sensor == Sensor::kStereo && !second_; }
   bool Depth() const { return options_.sensor == Sensor::kRgbd; }
-  std::string About(std::size_t i) const { return name_ + ": frame " + std::to_string(i); }
 
   CameraInput Open(std::size_t which) const {
     const std::vector<std::string> sources = CameraSources(name_);
@@ -197,13 +187,7 @@ class CameraDataset : public Dataset {
     if (rig_.left) frame.depth_m = rig_.left->Apply(frame.depth_m, Sampling::kNearest);
   }
 
-  std::string name_;
-  DatasetOptions options_;
   bool device_ = false;
-  RectifiedRig rig_;
-  cv::Size size_;  // of the left image
-  cv::Mat mask_;
-  std::vector<std::string> warnings_;
   double rate_hz_ = 30;
   const internal::Stopwatch since_begin_;
   const double begin_s_ =

@@ -11,11 +11,27 @@
 #include "tutti/core/text.h"
 
 namespace tutti {
-std::string At(const std::filesystem::path& file, std::size_t line) {
+namespace {
+
+namespace fs = std::filesystem;
+
+// From a left-handed frame with y up into the right-handed one with y down: S R S with S = diag(1, -1, 1)
+// turns the same angle about the mirrored axis, the other way round.
+void MirrorY(Trajectory& trajectory) {
+  for (StampedPose& p : trajectory) {
+    p.pose.translation.y() *= -1;
+    const Eigen::Quaterniond q = p.pose.rotation;
+    p.pose.rotation = Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z());
+  }
+}
+
+}  // namespace
+
+std::string At(const fs::path& file, std::size_t line) {
   return file.string() + ":" + std::to_string(line) + ": ";
 }
 
-std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
+std::vector<TextLine> ReadTextLines(const fs::path& file) {
   internal::TextReader in(file);
   std::vector<TextLine> lines;
   std::string text;
@@ -28,14 +44,14 @@ std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
   return lines;
 }
 
-std::vector<TextLine> ReadListLines(const std::filesystem::path& file) {
+std::vector<TextLine> ReadListLines(const fs::path& file) {
   std::vector<TextLine> lines = ReadTextLines(file);
   const auto is_number = [&](std::size_t i) { return ParseDouble(lines[i].words.front()).has_value(); };
   if (lines.size() > 1 && !is_number(0) && is_number(1)) lines.erase(lines.begin());
   return lines;
 }
 
-double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word) {
+double NumberAt(const fs::path& file, const TextLine& line, std::size_t word) {
   if (word >= line.words.size()) {
     throw InputError(At(file, line.number) + "has " + std::to_string(line.words.size()) +
                      " columns; at least " + std::to_string(word + 1) + " are needed");
@@ -53,8 +69,8 @@ double NumberAt(const std::filesystem::path& file, const TextLine& line, std::si
   return *value;
 }
 
-std::vector<double> StampsAt(const std::filesystem::path& file, const std::vector<TextLine>& lines,
-                             StampUnit& unit, std::vector<std::string>& warnings, std::size_t word) {
+std::vector<double> StampsAt(const fs::path& file, const std::vector<TextLine>& lines, StampUnit& unit,
+                             std::vector<std::string>& warnings, std::size_t word) {
   std::vector<double> stamps;
   stamps.reserve(lines.size());
   for (const TextLine& line : lines) stamps.push_back(NumberAt(file, line, word));
@@ -66,9 +82,8 @@ std::vector<double> StampsAt(const std::filesystem::path& file, const std::vecto
   return stamps;
 }
 
-Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& poses,
-                          const TrajectoryDetails& details, std::size_t count,
-                          const std::vector<std::pair<std::int64_t, double>>& frames) {
+Trajectory StampedByFrame(const fs::path& file, const Trajectory& poses, const TrajectoryDetails& details,
+                          std::size_t count, const std::vector<std::pair<std::int64_t, double>>& frames) {
   if (!details.has_numbers && poses.size() != count) {
     throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
                      " poses, but the sequence has " + std::to_string(count) +
@@ -107,20 +122,17 @@ bool StampOrder::Accept(std::size_t line, double stamp_s) {
   return true;
 }
 
-void WarnOfFramesWithoutDepth(const std::filesystem::path& list, std::size_t alone, const std::string& which,
-                              const DatasetOptions& options, FolderContents* contents) {
-  if (alone == 0 || options.follow_s > 0) return;
-  contents->warnings.push_back(list.string() + ": " + std::to_string(alone) + " of " +
-                               std::to_string(contents->frames.size()) + " " + which);
+void FolderContents::MeasureRate() {
+  if (frames.size() > 1)
+    rate_hz = static_cast<double>(frames.size() - 1) / (frames.back().stamp_s - frames.front().stamp_s);
 }
 
-void MirrorY(Trajectory& trajectory) {
-  // S R S with S = diag(1, -1, 1) turns the same angle about the mirrored axis, the other way round.
-  for (StampedPose& p : trajectory) {
-    p.pose.translation.y() *= -1;
-    const Eigen::Quaterniond q = p.pose.rotation;
-    p.pose.rotation = Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z());
-  }
+void FolderContents::ReportAlone(const fs::path& list, std::size_t alone, const std::string& none,
+                                 const std::string& some, const DatasetOptions& options) {
+  if (alone == frames.size()) throw InputError(list.string() + ": " + none);
+  if (alone == 0 || options.follow_s > 0) return;
+  warnings.push_back(list.string() + ": " + std::to_string(alone) + " of " + std::to_string(frames.size()) +
+                     " " + some);
 }
 
 FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& options)
@@ -129,8 +141,12 @@ FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& opti
     throw InputError(contents_.folder.string() +
                      ": holds no frame; check the folder and the options of the data set");
   }
+  if (contents_.pose_stamps.empty()) {
+    contents_.pose_count = Size();
+    for (std::size_t i = 0; i < Size(); ++i) contents_.pose_stamps.emplace_back(i, Stamp(i));
+  }
   FindImageSize();
-  SetUpRig();
+  rig_ = RectifyRig(contents_.folder.string(), contents_.rig, options_, size_, contents_.rate_hz);
   SetUpDepth();
   SetUpMasks();
 }
@@ -169,7 +185,7 @@ void FolderDataset::FindRange(std::size_t place, const cv::Mat& first) {
 
 void FolderDataset::SetUpDepth() {
   if (options_.sensor != Sensor::kRgbd) return;
-  depth_.emplace(options_, contents_.depth, contents_.left, size_);
+  depth_.emplace(options_, contents_.depth, contents_.rig.left, size_);
   if (options_.follow_s > 0) return;
   for (const FrameFiles& frame : contents_.frames) {
     if (frame.depth.empty()) continue;
@@ -178,26 +194,12 @@ void FolderDataset::SetUpDepth() {
   }
 }
 
-void FolderDataset::SetUpRig() {
-  RigCalibration calibration;
-  calibration.left = contents_.left;
-  calibration.right = contents_.right;
-  calibration.T_right_left = contents_.T_right_left;
-  calibration.baseline_m = contents_.baseline_m;
-  calibration.T_body_left = contents_.T_body_left;
-  RectifiedRig made =
-      RectifyRig(contents_.folder.string(), std::move(calibration), options_, size_, contents_.rate_hz);
-  rig_ = made.rig;
-  left_ = std::move(made.left);
-  right_ = std::move(made.right);
-}
-
 void FolderDataset::SetUpMasks() {
   if (options_.mask.empty()) return;
   ImageMasks masks(options_.mask);
   if (!masks.PerImage()) {
     mask_ = masks.OfAll(size_);
-    if (left_) mask_ = left_->Apply(mask_, Sampling::kNearest);
+    if (rig_.left) mask_ = rig_.left->Apply(mask_, Sampling::kNearest);
     return;
   }
   masks_ = std::move(masks);
@@ -220,22 +222,22 @@ void FolderDataset::SetUpMasks() {
                                " have no mask; all of them is used");
 }
 
-cv::Mat FolderDataset::MaskOf(const std::filesystem::path& image) const {
+cv::Mat FolderDataset::MaskOf(const fs::path& image) const {
   if (!masks_) return mask_;
   const cv::Mat mask = masks_->Of(image.stem().string(), size_);
-  return mask.empty() || !left_ ? mask : left_->Apply(mask, Sampling::kNearest);
+  return mask.empty() || !rig_.left ? mask : rig_.left->Apply(mask, Sampling::kNearest);
 }
 
 // What is wrong with the image that was read from `file`; else `out` gets it, 8 bit and rectified.
-std::string FolderDataset::Rectify(const ImageFile& read, const std::filesystem::path& file,
-                                   const Rectifier* rectifier, cv::Mat& out) const {
+std::string FolderDataset::Rectify(const ImageFile& read, const fs::path& file,
+                                   const std::optional<Rectifier>& rectifier, cv::Mat& out) const {
   if (!read.error.empty()) return read.error;
   if (read.image.size() != size_) {
     return file.string() + ": has " + SizeText(read.image.size()) +
            " pixels, but the data set's images have " + SizeText(size_);
   }
   out = To8Bit(read.image, range_);
-  if (rectifier != nullptr) out = rectifier->Apply(out);
+  if (rectifier) out = rectifier->Apply(out);
   return {};
 }
 
@@ -261,7 +263,7 @@ std::string FolderDataset::NoFrame(std::size_t i) const {
 ColourImage FolderDataset::ReadColourOf(const FrameFiles& files) const {
   ColourImage out;
   try {
-    out.error = Rectify(ReadColourFile(files.image), files.image, left_ ? &*left_ : nullptr, out.image);
+    out.error = Rectify(ReadColourFile(files.image), files.image, rig_.left, out.image);
   } catch (const std::exception& e) {
     out = {cv::Mat(), files.image.string() + ": can't be used: " + e.what()};
   }
@@ -274,14 +276,12 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
     InputFrame frame;
     frame.index = Number(i);
     frame.stamp_s = files.stamp_s;
-    result.error = Rectify(ReadGreyFile(files.image), files.image, left_ ? &*left_ : nullptr, frame.image);
+    result.error = Rectify(ReadGreyFile(files.image), files.image, rig_.left, frame.image);
     if (!result.error.empty()) return result;
     frame.mask = MaskOf(files.image);
     if (!files.right.empty())
-      result.depth_error =
-          Rectify(ReadGreyFile(files.right), files.right, right_ ? &*right_ : nullptr, frame.right);
-    if (!files.depth.empty())
-      result.depth_error = depth_->Read(files.depth, left_ ? &*left_ : nullptr, frame.depth_m);
+      result.depth_error = Rectify(ReadGreyFile(files.right), files.right, rig_.right, frame.right);
+    if (!files.depth.empty()) result.depth_error = depth_->Read(files.depth, rig_.left, frame.depth_m);
     result.frame = std::move(frame);
   } catch (const std::exception& e) {  // out of memory for an absurd image size, and the like
     result.frame.reset();
@@ -290,13 +290,13 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
   return result;
 }
 
-std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
+std::optional<fs::path> FolderDataset::GroundTruthFile() const {
   std::error_code code;
   if (contents_.truth && HoldsTruth(*contents_.truth)) return contents_.truth->place;
-  for (const std::filesystem::path& file : contents_.truth_places) {
-    if (std::filesystem::is_regular_file(file, code)) return file;
+  for (const fs::path& file : contents_.truth_places) {
+    if (fs::is_regular_file(file, code)) return file;
     // A folder, or a link that leads nowhere: the run is not to end without its figures and without a word.
-    if (std::filesystem::exists(std::filesystem::symlink_status(file, code))) {
+    if (fs::exists(fs::symlink_status(file, code))) {
       throw InputError(file.string() +
                        ": should be the ground truth, but is no readable file; repair or remove it, or give "
                        "--ground-truth FILE or none");
@@ -305,10 +305,9 @@ std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
   return std::nullopt;
 }
 
-Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
-                                          std::vector<std::string>* warnings) const {
+Trajectory FolderDataset::ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const {
   std::error_code code;
-  if (contents_.truth && std::filesystem::equivalent(file, contents_.truth->place, code))
+  if (contents_.truth && fs::equivalent(file, contents_.truth->place, code))
     return ReadLayoutTruth(*contents_.truth, warnings);
   TrajectoryDetails details;
   Trajectory poses =
@@ -317,12 +316,8 @@ Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
   internal::FitUnit({Stamp(0) / scale, Stamp(Size() - 1) / scale}, poses, details, warnings);
   if (details.has_stamps) {
     for (StampedPose& p : poses) p.stamp_s *= scale;
-  } else if (!contents_.pose_stamps.empty()) {
-    poses = StampedByFrame(file, poses, details, contents_.pose_count, contents_.pose_stamps);
   } else {
-    std::vector<std::pair<std::int64_t, double>> frames;
-    for (std::size_t i = 0; i < Size(); ++i) frames.emplace_back(i, Stamp(i));
-    poses = StampedByFrame(file, poses, details, Size(), frames);
+    poses = StampedByFrame(file, poses, details, contents_.pose_count, contents_.pose_stamps);
   }
   if (options_.mirrored_ground_truth) MirrorY(poses);
   return poses;

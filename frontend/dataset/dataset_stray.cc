@@ -47,8 +47,7 @@ class StrayDataset : public Dataset {
     result.frame->stamp_s = stamps_[i];
     if (!reader_ || depth_[i].empty()) return result;
     try {
-      result.depth_error =
-          reader_->Read(depth_[i], rectifier_ ? &*rectifier_ : nullptr, result.frame->depth_m);
+      result.depth_error = reader_->Read(depth_[i], rectifier_, result.frame->depth_m);
     } catch (const std::exception& e) {
       result.depth_error = depth_[i].string() + ": can't be used: " + e.what();
     }

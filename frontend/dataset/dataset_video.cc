@@ -143,18 +143,20 @@ class VideoFrames {
   mutable std::map<std::size_t, cv::Mat> kept_;
 };
 
-class VideoDataset : public Dataset {
+class VideoDataset : public RecordedDataset {
  public:
   VideoDataset(const std::filesystem::path& file, const DatasetOptions& options)
-      : file_(file), grey_(file_, Pixels::kGrey, 48), colour_(file_, Pixels::kColour, 2) {
-    VideoDecoder video(file_);
+      : RecordedDataset(file.string(), options),
+        grey_(name_, Pixels::kGrey, 48),
+        colour_(name_, Pixels::kColour, 2) {
+    VideoDecoder video(name_);
     const cv::Mat first = video.Grab() ? video.Retrieve(Pixels::kGrey) : cv::Mat();
-    if (first.empty()) throw InputError(file_ + ": no frame can be decoded; is it a complete video file?");
+    if (first.empty()) throw InputError(name_ + ": no frame can be decoded; is it a complete video file?");
     size_ = first.size();
     const double stated_hz = options.rate_hz > 0  ? options.rate_hz
                              : video.RateHz() > 0 ? video.RateHz()
                                                   : 30.0;
-    VideoTimes times = TimesOf(file_, video.Ticks(), stated_hz);
+    VideoTimes times = TimesOf(name_, video.Ticks(), stated_hz);
     ticks_ = std::move(times.ticks);
     stamps_s_ = std::move(times.stamps_s);
     warnings_ = std::move(times.notes);
@@ -164,19 +166,14 @@ class VideoDataset : public Dataset {
         stamps_s_[i] = static_cast<double>(i) / options.rate_hz;
     }
     turned_by_ = video.TurnedBy();
-    DatasetOptions use = options;
-    use.camera = CameraOfVideo(file_, video, options, size_, warnings_);
-    rig_ = RectifyRig(file_, use, size_, stated_hz, warnings_);
-    mask_ = MaskOfAll(options, size_, rig_.left);
+    options_.camera = CameraOfVideo(name_, video, options, size_, warnings_);
+    SetUpRig(stated_hz);
   }
 
   std::size_t Size() const override { return stamps_s_.size(); }
   double Stamp(std::size_t i) const override { return stamps_s_.at(i); }
   double SkippedShare() const override { return skipped_share_; }
-  const CameraRig& Rig() const override { return rig_.rig; }
   int TurnedBy() const override { return turned_by_; }
-  std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
-  const std::vector<std::string>& Warnings() const override { return warnings_; }
 
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override {
@@ -210,23 +207,17 @@ class VideoDataset : public Dataset {
   // What is wrong with frame i; else `out` gets it.
   std::string Rectified(const VideoFrames& frames, std::size_t i, cv::Mat& out) const {
     const cv::Mat image = i < Size() ? frames.Fetch(i, ticks_) : cv::Mat();
-    if (image.empty()) return file_ + ": frame " + std::to_string(i) + " can't be decoded";
-    if (image.size() != size_)
-      return file_ + ": frame " + std::to_string(i) + " has another size than the first";
+    if (image.empty()) return About(i) + " can't be decoded";
+    if (image.size() != size_) return About(i) + " has another size than the first";
     out = rig_.left ? rig_.left->Apply(image) : image;
     return {};
   }
 
-  std::string file_;
   VideoFrames grey_, colour_;
-  RectifiedRig rig_;
-  std::vector<std::string> warnings_;
   std::vector<std::int64_t> ticks_;  // of the frames, as VideoTimes has them
   std::vector<double> stamps_s_;
-  cv::Size size_;
   int turned_by_ = 0;
   double skipped_share_ = 0;
-  cv::Mat mask_;
 };
 
 }  // namespace

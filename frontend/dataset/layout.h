@@ -109,6 +109,16 @@ TumLists TumListsOf(const std::filesystem::path& folder);
 /// Of data sets in TUM's layout that have a calibration: OpenLORIS (sensors.yaml), ETH3D (calibration.txt).
 LayoutCalibration ReadTumCalibration(const std::filesystem::path& folder);
 
+/// One camera of an ASL data set.
+struct SensorYaml {
+  PinholeCamera camera;
+  std::optional<Pose> T_body_sensor;  ///< T_BS, where the file has it
+  std::optional<double> rate_hz;
+};
+/// EuRoC's sensor.yaml. Throws InputError that names file and line for a missing file or key, a wrong number
+/// of values, an unknown model.
+SensorYaml ReadSensorYaml(const std::filesystem::path& file);
+
 /// What a layout says of its depth images, but for their camera.
 DepthFormat FormatOfDepth(const Layout& layout);
 /// The intrinsics of a file of 4 numbers, or a matrix. Throws InputError.

@@ -17,10 +17,9 @@ PinholeCamera Fitting(const std::string& name, const char* which, PinholeCamera 
     camera.height = size.height;
   }
   const cv::Size calibrated(camera.width, camera.height);
-  if (calibrated != size) {
+  if (calibrated != size)
     throw InputError(name + ": the " + which + "camera is calibrated for images of " + SizeText(calibrated) +
                      ", but the images have " + SizeText(size) + "; use the calibration of this camera");
-  }
   const std::string problem = camera.Validate();
   if (!problem.empty()) throw InputError(name + ": " + which + problem);
   return camera;
@@ -63,13 +62,8 @@ void TakeRectifiedPairs(const std::string& name, const PinholeCamera& left, doub
 }  // namespace
 
 PinholeCamera CameraOfView(double degrees, cv::Size size) {
-  PinholeCamera camera;
-  camera.width = size.width;
-  camera.height = size.height;
-  camera.fx = camera.fy = 0.5 * size.width / std::tan(0.5 * degrees / internal::kDegrees);
-  camera.cx = 0.5 * (size.width - 1);
-  camera.cy = 0.5 * (size.height - 1);
-  return camera;
+  const double f = 0.5 * size.width / std::tan(0.5 * degrees / internal::kDegrees);
+  return Pinhole(f, f, 0.5 * (size.width - 1), 0.5 * (size.height - 1), size);
 }
 
 RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, const DatasetOptions& options,
@@ -92,8 +86,7 @@ RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, con
                        ": camera.right is given, but not the left camera; set its fx, fy, cx and cy "
                        "under 'camera:', too");
     rig.calibrated = false;
-    rig.camera.width = size.width;
-    rig.camera.height = size.height;
+    rig.camera = Pinhole(0, 0, 0, 0, size);
     return out;
   }
   const PinholeCamera left = Fitting(name, "", *calibration.left, size);

@@ -26,6 +26,14 @@ struct RectifiedRig {
   std::optional<Rectifier> left, right;
 };
 
+/// A camera without distortion; without a size it has that of its images.
+inline PinholeCamera Pinhole(double fx, double fy, double cx, double cy, cv::Size size = {}) {
+  PinholeCamera camera;
+  camera.width = size.width, camera.height = size.height;
+  camera.fx = fx, camera.fy = fy, camera.cx = cx, camera.cy = cy;
+  return camera;
+}
+
 /// The camera with this horizontal field of view [deg]: square pixels, principal point in the middle.
 PinholeCamera CameraOfView(double degrees, cv::Size size);
 

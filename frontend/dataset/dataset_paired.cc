@@ -58,9 +58,9 @@ std::vector<std::int64_t> CountsOf(const std::vector<RoleImage>& images) {
 
 // Time stamps of the left images: of the layout's list, of their names, or by their numbers. Nothing for an
 // image whose line is refused. Sets the rate where nothing is known of it.
-std::vector<std::optional<double>> StampsOf(const fs::path& folder, const Layout& layout,
-                                            const DatasetOptions& options,
-                                            const std::vector<RoleImage>& images, FolderContents& out) {
+std::vector<std::optional<double>> StampsOfLayout(const fs::path& folder, const Layout& layout,
+                                                  const DatasetOptions& options,
+                                                  const std::vector<RoleImage>& images, FolderContents& out) {
   std::vector<std::optional<double>> stamps;
   const fs::path list = folder / layout.stamps;
   const std::vector<std::int64_t> numbers = CountsOf(images);
@@ -90,9 +90,11 @@ std::vector<std::optional<double>> StampsOf(const fs::path& folder, const Layout
 
 void PlaceTruth(const fs::path& folder, const Layout& layout, FolderContents& out) {
   out.truth_places = {folder / "groundtruth.txt", folder / "poses.txt", folder / "groundtruth_tum.txt"};
-  if (layout.form == TruthForm::kNone) return;
-  out.truth.emplace(LayoutTruth{
-      *layout.truth == '\0' ? folder : folder / layout.truth, layout.form, {"", layout.truth_word}, {}});
+  if (layout.truth.form == TruthForm::kNone) return;
+  out.truth.emplace(LayoutTruth{*layout.truth.name == '\0' ? folder : folder / layout.truth.name,
+                                layout.truth.form,
+                                {"", layout.truth.word},
+                                {}});
 }
 
 void SetCalibration(const fs::path& folder, const FoundLayout& found, const DatasetOptions& options,
@@ -139,7 +141,8 @@ FoundLayout LayoutOf(const fs::path& folder, Sensor sensor) {
 }  // namespace
 
 DepthFormat FormatOfDepth(const Layout& layout) {
-  return {layout.depth_units_per_m, std::nullopt, layout.form == TruthForm::kOdometry, layout.float_in_png};
+  return {layout.depth_units_per_m, std::nullopt, layout.truth.form == TruthForm::kOdometry,
+          layout.float_in_png};
 }
 
 FolderContents FindPaired(const fs::path& folder, const DatasetOptions& options) {
@@ -155,7 +158,7 @@ FolderContents FindPaired(const fs::path& folder, const DatasetOptions& options)
   constexpr double kSamePair_s = 2.5e-3;
   const std::vector<int> partners =
       Partners(images, others, stereo ? kSamePair_s : options.max_association_s);
-  const std::vector<std::optional<double>> stamps = StampsOf(folder, layout, options, images, out);
+  const std::vector<std::optional<double>> stamps = StampsOfLayout(folder, layout, options, images, out);
   std::size_t alone = 0;
   PlaceTruth(folder, layout, out);
   for (std::size_t i = 0; i < images.size(); ++i) {

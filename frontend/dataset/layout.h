@@ -31,6 +31,13 @@ enum class TruthForm {
   kOdometry  ///< Stray Scanner: stamp, frame, x, y, z, qx, qy, qz, qw
 };
 
+/// Where a layout has its ground truth.
+struct TruthPlace {
+  TruthForm form = TruthForm::kNone;
+  const char* name = "";  ///< file or folder; "": the data set's folder itself
+  const char* word = "";  ///< kFiles: of the names, as ImageRole::word
+};
+
 struct Layout {
   const char* name;  ///< empty: nobody's in particular
   ImageRole left, right, depth;
@@ -44,9 +51,7 @@ struct Layout {
   double baseline_m = 0;
   double depth_units_per_m = 0;  ///< 0: not known
   double rate_hz = 0;            ///< 0: not known
-  const char* truth = "";        ///< file or folder; "": the data set's folder itself
-  const char* truth_word = "";   ///< kFiles: of the names, as ImageRole::word
-  TruthForm form = TruthForm::kNone;
+  TruthPlace truth{};
   bool float_in_png = false;        ///< depth: the four bytes of a pixel are a float
   bool forward_right_down = false;  ///< the ground truth's camera looks along x, y to the right
 };
@@ -100,6 +105,7 @@ LayoutCalibration ReadLayoutCalibration(const std::filesystem::path& folder, con
 /// The same of KITTI raw.
 LayoutCalibration ReadKittiRawCalibration(const std::filesystem::path& folder, const FoundLayout& found,
                                           cv::Size size);
+
 /// Lists of TUM's layout.
 struct TumLists {
   const char* colour = "rgb.txt";

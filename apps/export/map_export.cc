@@ -145,11 +145,10 @@ class FolderExport {
            "colmap gui, File > Import model, " + path +
                "/sparse/0; or a trainer of Gaussian splats: train.py -s " + path});
     }
-    if (folder.transforms) {
+    if (folder.transforms)
       report->files.push_back({folder.path / kTransforms,
                                images + ", " + Count(model_.landmarks.size(), "landmark") + " in " + kPoints,
                                "ns-train splatfacto --data " + folder.path.string()});
-    }
   }
 
  private:

@@ -25,11 +25,10 @@ void AppendVertex(const Eigen::Vector3d& at, const std::array<std::uint8_t, 3>& 
 // How far the base is from the apex [m].
 double FrustumDepth(const MapModel& model) {
   std::vector<double> steps;
-  for (std::size_t i = 1; i < model.keyframes.size(); ++i) {
+  for (std::size_t i = 1; i < model.keyframes.size(); ++i)
     steps.push_back(
         (model.keyframes[i].T_world_camera.translation - model.keyframes[i - 1].T_world_camera.translation)
             .norm());
-  }
   const double median = internal::Median(steps);
   return median > 0 ? 0.5 * median : 0.1;
 }
@@ -54,10 +53,9 @@ void WritePly(const std::filesystem::path& file, const MapModel& model, PlyCamer
       std::to_string(points + kCorners * frusta) +
       "\nproperty float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uint observations\n";
-  if (frusta > 0) {
+  if (frusta > 0)
     bytes += "element face " + std::to_string(kTriangles.size() * frusta) +
              "\nproperty list uchar int vertex_indices\n";
-  }
   bytes += "end_header\n";
   for (const ModelLandmark& landmark : model.landmarks)
     AppendVertex(landmark.position, landmark.rgb, landmark.observations, &bytes);

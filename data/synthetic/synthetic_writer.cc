@@ -106,9 +106,8 @@ void RemoveOwn(const fs::path& folder) {
 
 void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts, bool force) {
   std::error_code code;
-  if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
+  if (fs::exists(folder, code) && !fs::is_directory(folder, code))
     throw InputError(folder.string() + ": is a file; give a folder");
-  }
   if (fs::exists(folder, code) && !fs::is_empty(folder, code)) {
     if (!force)
       throw InputError(folder.string() + ": is not empty; give another folder, or --force to write into it");
@@ -116,10 +115,9 @@ void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts
   }
   for (const std::string& part : parts) {
     fs::create_directories(folder / part, code);
-    if (code) {
+    if (code)
       throw InputError((folder / part).string() + ": can't be made (" + code.message() +
                        "); check the permissions");
-    }
   }
 }
 
@@ -143,10 +141,9 @@ std::string ConfigText(const SyntheticWorld& world) {
                    : "mono")
       << "\n"
       << "  rate_hz: " << o.rate_hz << "  # frames per second\n";
-  if (rgbd) {
+  if (rgbd)
     out << "  depth_units_per_m: " << o.depth_units_per_m << "  # value in the depth image of one metre\n"
         << "  max_depth_m: " << o.max_depth_m << "  # nothing is measured beyond [m]\n";
-  }
   out << "camera:\n  width: " << c.width << "  # [px]\n  height: " << c.height << "\n  fx: " << c.fx
       << "  # [px]\n  fy: " << c.fy << "\n  cx: " << c.cx << "\n  cy: " << c.cy << "\n  distortion: none\n";
   if (stereo)
@@ -244,9 +241,8 @@ class Writer {
     if (sensor_ == SyntheticSensor::kRgbd) {
       for (const char* part : {"rgb", "depth"}) {
         std::string list = "# timestamp filename\n";
-        for (const StampedPose& p : truth) {
+        for (const StampedPose& p : truth)
           list += Fixed(p.stamp_s) + " " + part + "/" + StampName(p.stamp_s) + "\n";
-        }
         internal::WriteFile(folder_ / (std::string(part) + ".txt"), list);
       }
       WriteTrajectory(folder_ / "groundtruth.txt", truth, TrajectoryFormat::kTum);

@@ -137,10 +137,9 @@ std::size_t Bag::Lost(const std::string& topic) const {
 }
 
 void Bag::AddMessage(const BagMessage& message) {
-  if (messages_.size() == kMostBagMessages) {
+  if (messages_.size() == kMostBagMessages)
     throw InputError(file_.string() + ": has more than " + std::to_string(kMostBagMessages / 1'000'000) +
                      " million messages; take the images out with 'rosbag filter' or 'ros2 bag convert'");
-  }
   messages_.push_back(message);
 }
 

@@ -28,11 +28,10 @@ std::optional<Pose> RigidTransform(const TransformRows& rows) {
   const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
   const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 0.01 &&
                         R.determinant() > 0;  // false if anything is not finite
-  if (!rotation || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  if (!rotation || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
     throw InputError(
         "is not a rigid transform: 4 rows are needed, a rotation with the translation [m] behind it, and "
         "0, 0, 0, 1");
-  }
   return Pose::FromMatrix(matrix.topRows<3>());
 }
 
@@ -86,11 +85,10 @@ std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s) {
 }
 
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options) {
-  if (options.sensor != Sensor::kMono) {
+  if (options.sensor != Sensor::kMono)
     throw InputError(folder.string() +
                      ": a plain folder of images is mono; for stereo use the KITTI or EuRoC layout, for "
                      "RGB-D the TUM layout (data/README.md shows them)");
-  }
   FolderContents out;
   out.folder = folder;
   out.left = options.camera;
@@ -155,10 +153,9 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
                      ": gives its frames once, in order, and all of them are needed here; save them as a "
                      "video file, and give that");
   std::error_code code;
-  if (!std::filesystem::exists(path, code)) {
+  if (!std::filesystem::exists(path, code))
     throw InputError(path.string() +
                      ": does not exist; give the folder of a data set, a folder of images, or a video file");
-  }
   if (!std::filesystem::is_directory(path, code)) {
     if (HasImageExtension(path))
       throw InputError(path.string() + ": is a single image; give the folder that holds it");
@@ -249,12 +246,11 @@ Place PlaceToOpen(const std::filesystem::path& path, const DatasetOptions& optio
   const auto is_file = [](DatasetType t) { return t == DatasetType::kVideo || t == DatasetType::kBag; };
   std::error_code code;
   const bool folder = std::filesystem::is_directory(path, code);
-  if (is_file(type) != is_file(seen) || (folder && type == DatasetType::kVideo)) {
+  if (is_file(type) != is_file(seen) || (folder && type == DatasetType::kVideo))
     throw InputError(path.string() + (is_file(type)
                                           ? ": is a folder, but the type is video or bag; give the file"
                                       : folder ? ": holds bags of ROS 2; let dataset.type be auto, or bag"
                                                : ": is a file; give the folder of the data set"));
-  }
   return {path, type, {}};
 }
 

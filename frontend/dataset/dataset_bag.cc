@@ -92,10 +92,9 @@ class BagDataset : public RecordedDataset {
       images.push_back(topic.name);
       list += " " + topic.name;
     }
-    if (images.empty()) {
+    if (images.empty())
       throw InputError(name_ + ": holds no topic of sensor_msgs/Image or CompressedImage" +
                        (bag_->damage().empty() ? "" : "; it is damaged (" + bag_->damage() + ")"));
-    }
     if (options_.topic.empty() && images.size() == 1) options_.topic = images.front();
     const auto check = [&](const char* key, const std::string& topic) {
       if (std::find(images.begin(), images.end(), topic) != images.end()) return;
@@ -120,10 +119,9 @@ class BagDataset : public RecordedDataset {
                                   [](const BagMessage& m) { return std::isnan(m.stamp_s); }),
                    messages.end());
     const std::size_t all = stored + bag_->Lost(topic);
-    if (messages.size() < all) {
+    if (messages.size() < all)
       warnings_.push_back(name_ + ": " + std::to_string(all - messages.size()) + " of " +
                           std::to_string(all) + " images of " + topic + " can't be read and are skipped");
-    }
     return messages;
   }
 
@@ -169,11 +167,10 @@ class BagDataset : public RecordedDataset {
         throw InputError(StampsJumpBack(name_ + ": " + topic, kept.size(), kept.back().stamp_s, m.stamp_s));
       if (kept.empty() || m.stamp_s > kept.back().stamp_s) kept.push_back(m);
     }
-    if (kept.size() < messages.size()) {
+    if (kept.size() < messages.size())
       warnings_.push_back(name_ + ": " + std::to_string(messages.size() - kept.size()) + " of " +
                           std::to_string(messages.size()) + " images of " + topic +
                           " repeat a time stamp and are skipped");
-    }
     const std::size_t all = bag_->Messages(topic).size() + bag_->Lost(topic);
     if (topic == options_.topic && !kept.empty())
       skipped_share_ = 1 - static_cast<double>(kept.size()) / static_cast<double>(all);
@@ -210,15 +207,13 @@ class BagDataset : public RecordedDataset {
     }
     if (options_.sensor == Sensor::kMono) return;
     const std::string what = options_.sensor == Sensor::kRgbd ? "depth" : "right";
-    if (alone == frames_.size()) {
+    if (alone == frames_.size())
       throw InputError(name_ + ": no image of " + options_.topic + " has its " + what +
                        " image near it in time");
-    }
-    if (alone > 0) {
+    if (alone > 0)
       warnings_.push_back(name_ + ": " + std::to_string(alone) + " of " + std::to_string(frames_.size()) +
                           " images of " + options_.topic + " have no " + what +
                           " image near them in time and are tracked without");
-    }
   }
 
   // The camera_info beside the images of a topic, of the size that they have.

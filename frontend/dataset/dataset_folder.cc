@@ -52,20 +52,17 @@ std::vector<TextLine> ReadListLines(const fs::path& file) {
 }
 
 double NumberAt(const fs::path& file, const TextLine& line, std::size_t word) {
-  if (word >= line.words.size()) {
+  if (word >= line.words.size())
     throw InputError(At(file, line.number) + "has " + std::to_string(line.words.size()) +
                      " columns; at least " + std::to_string(word + 1) + " are needed");
-  }
   const std::optional<double> value = ParseDouble(line.words[word]);
   const std::string comma = internal::DecimalComma(line.text);
-  if (comma.rfind(line.words[word] + ",", 0) == 0) {
+  if (comma.rfind(line.words[word] + ",", 0) == 0)
     throw InputError(At(file, line.number) + "'" + internal::Excerpt(comma) +
                      "' has a decimal comma; write decimal points");
-  }
-  if (!value || !std::isfinite(*value)) {
+  if (!value || !std::isfinite(*value))
     throw InputError(At(file, line.number) + "'" + internal::Excerpt(line.words[word]) +
                      "' is not a finite number; repair or remove the line");
-  }
   return *value;
 }
 
@@ -84,11 +81,10 @@ std::vector<double> StampsAt(const fs::path& file, const std::vector<TextLine>& 
 
 Trajectory StampedByFrame(const fs::path& file, const Trajectory& poses, const TrajectoryDetails& details,
                           std::size_t count, const std::vector<std::pair<std::int64_t, double>>& frames) {
-  if (!details.has_numbers && poses.size() != count) {
+  if (!details.has_numbers && poses.size() != count)
     throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
                      " poses, but the sequence has " + std::to_string(count) +
                      " frames; KITTI poses need one line for each frame");
-  }
   Trajectory out;
   auto pose = poses.begin();
   for (const auto& [number, stamp_s] : frames) {
@@ -104,11 +100,10 @@ Trajectory StampedByFrame(const fs::path& file, const Trajectory& poses, const T
 }
 
 bool StampOrder::Accept(std::size_t line, double stamp_s) {
-  if (last_ && stamp_s < *last_) {
+  if (last_ && stamp_s < *last_)
     throw InputError(At(file_, line) + "time stamp " + std::to_string(stamp_s) +
                      " s goes back in time (the one before is " + std::to_string(*last_) +
                      " s); sort the file by time, or cut it there if it is two recordings");
-  }
   if (last_ && stamp_s == *last_) {
     constexpr std::size_t kMostLines = 5;
     if (++skipped_ <= kMostLines + 1) warnings_.emplace_back();
@@ -137,10 +132,9 @@ void FolderContents::ReportAlone(const fs::path& list, std::size_t alone, const 
 
 FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& options)
     : contents_(std::move(contents)), options_(options) {
-  if (contents_.frames.empty()) {
+  if (contents_.frames.empty())
     throw InputError(contents_.folder.string() +
                      ": holds no frame; check the folder and the options of the data set");
-  }
   if (contents_.pose_stamps.empty()) {
     contents_.pose_count = Size();
     for (std::size_t i = 0; i < Size(); ++i) contents_.pose_stamps.emplace_back(i, Stamp(i));
@@ -232,10 +226,9 @@ cv::Mat FolderDataset::MaskOf(const fs::path& image) const {
 std::string FolderDataset::Rectify(const ImageFile& read, const fs::path& file,
                                    const std::optional<Rectifier>& rectifier, cv::Mat& out) const {
   if (!read.error.empty()) return read.error;
-  if (read.image.size() != size_) {
+  if (read.image.size() != size_)
     return file.string() + ": has " + SizeText(read.image.size()) +
            " pixels, but the data set's images have " + SizeText(size_);
-  }
   out = To8Bit(read.image, range_);
   if (rectifier) out = rectifier->Apply(out);
   return {};
@@ -296,11 +289,10 @@ std::optional<fs::path> FolderDataset::GroundTruthFile() const {
   for (const fs::path& file : contents_.truth_places) {
     if (fs::is_regular_file(file, code)) return file;
     // A folder, or a link that leads nowhere: the run is not to end without its figures and without a word.
-    if (fs::exists(fs::symlink_status(file, code))) {
+    if (fs::exists(fs::symlink_status(file, code)))
       throw InputError(file.string() +
                        ": should be the ground truth, but is no readable file; repair or remove it, or give "
                        "--ground-truth FILE or none");
-    }
   }
   return std::nullopt;
 }

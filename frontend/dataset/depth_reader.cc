@@ -67,10 +67,9 @@ std::string DepthReader::Read(const std::filesystem::path& file, const std::opti
   constexpr double kMillimetres = 1000;  // 65.535 m is what a Kinect's driver writes for "none"
   if (read.image.type() == CV_16UC1 && format_.units_per_m == kMillimetres)
     depth.setTo(0, read.image == std::numeric_limits<unsigned short>::max());
-  if (depth.size() != size_ && !Resample(depth)) {
+  if (depth.size() != size_ && !Resample(depth))
     return file.string() + ": the depth image has " + SizeText(depth.size()) +
            " pixels, but the colour images have " + SizeText(size_) + "; depth must be registered to colour";
-  }
   metres = rectifier ? rectifier->Apply(depth, Sampling::kNearest) : depth;
   return {};
 }

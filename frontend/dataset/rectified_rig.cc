@@ -30,12 +30,11 @@ void RectifyPairs(const std::string& name, const PinholeCamera& left, const RigC
   StereoRectification stereo =
       RectifyStereo(left, Fitting(name, "right ", *calibration.right, size), *calibration.T_right_left);
   if (options.right && options.baseline_m > 0 &&
-      std::abs(options.baseline_m - stereo.baseline_m) > 0.01 * stereo.baseline_m) {
+      std::abs(options.baseline_m - stereo.baseline_m) > 0.01 * stereo.baseline_m)
     throw InputError(name + ": camera.baseline_m is " + std::to_string(options.baseline_m) +
                      " m, but the cameras of camera.right.T_right_left lie " +
                      std::to_string(stereo.baseline_m) +
                      " m apart; leave baseline_m out, which is of rectified pairs");
-  }
   out.left = std::move(stereo.left);
   out.right = std::move(stereo.right);
   out.rig.baseline_m = stereo.baseline_m;
@@ -44,18 +43,16 @@ void RectifyPairs(const std::string& name, const PinholeCamera& left, const RigC
 
 void TakeRectifiedPairs(const std::string& name, const PinholeCamera& left, double baseline_m,
                         RectifiedRig& out) {
-  if (left.distortion != Distortion::kNone) {
+  if (left.distortion != Distortion::kNone)
     throw InputError(name +
                      ": stereo pairs must be rectified, but the camera has distortion; of raw pairs give the "
                      "right camera, "
                      "too (camera.right, or a sensor.yaml for each in the EuRoC layout), of rectified ones "
                      "set it to none");
-  }
-  if (!(baseline_m > 0)) {
+  if (!(baseline_m > 0))
     throw InputError(name +
                      ": the distance of the two cameras is not known; set camera.baseline_m [m], or add "
                      "calib.txt with P1 (KITTI), or give the right camera (camera.right) of raw pairs");
-  }
   out.rig.baseline_m = baseline_m;
 }
 

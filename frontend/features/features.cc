@@ -24,10 +24,9 @@ constexpr int kHalfPatch = internal::IntensityCentroid::kRadius;  // [px]
 const internal::IntensityCentroid& OrientationPatch() {
   static const internal::IntensityCentroid patch = [] {
     internal::IntensityCentroid::HalfWidths widths{};
-    for (int v = 0; v <= kHalfPatch; ++v) {
+    for (int v = 0; v <= kHalfPatch; ++v)
       widths[static_cast<std::size_t>(v)] =
           static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
-    }
     return internal::IntensityCentroid(widths);
   }();
   return patch;
@@ -143,10 +142,9 @@ void FrameFeatures::FillGrid() {
   std::partial_sum(first_entry_.begin(), first_entry_.end(), first_entry_.begin());
   entries_.resize(keypoints.size());
   std::vector<int> next(first_entry_.begin(), first_entry_.end() - 1);
-  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+  for (std::size_t i = 0; i < keypoints.size(); ++i)
     entries_[static_cast<std::size_t>(next[cell_of[i]]++)] = {keypoints[i].pt, keypoints[i].octave,
                                                               static_cast<int>(i)};
-  }
 }
 
 void FrameFeatures::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
@@ -166,9 +164,8 @@ std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features
 std::vector<float> PyramidScales(const OdometryOptions& options) {
   std::vector<float> scales;
   scales.reserve(static_cast<std::size_t>(std::max(0, options.pyramid_levels)));
-  for (int l = 0; l < options.pyramid_levels; ++l) {
+  for (int l = 0; l < options.pyramid_levels; ++l)
     scales.push_back(static_cast<float>(std::pow(options.scale_factor, l)));
-  }
   return scales;
 }
 

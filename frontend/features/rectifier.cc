@@ -42,10 +42,9 @@ PinholeCamera CameraForView(const View& view, int width, int height, double fx_o
   camera.width = width;
   camera.height = height;
   const double view_width = view.right - view.left, view_height = view.bottom - view.top;
-  if (!(view_width > 1e-3 && view_height > 1e-3)) {
+  if (!(view_width > 1e-3 && view_height > 1e-3))
     throw InputError(
         "camera: the distortion leaves no usable view; check the distortion model and its coefficients");
-  }
   camera.fy = std::max((height - 1) / view_height, (width - 1) / view_width / fx_over_fy);
   camera.fx = camera.fy * fx_over_fy;
   camera.cx = 0.5 * (width - 1) - camera.fx * 0.5 * (view.left + view.right);
@@ -101,15 +100,13 @@ cv::Mat Rectifier::Apply(const cv::Mat& image, Sampling sampling) const {
 
 StereoRectification RectifyStereo(const PinholeCamera& left, const PinholeCamera& right,
                                   const Pose& T_right_left) {
-  if (left.width != right.width || left.height != right.height) {
+  if (left.width != right.width || left.height != right.height)
     throw InputError("stereo calibration: the two cameras have different image sizes; they must be equal");
-  }
   // The right camera's position, seen from the left one.
   const Eigen::Vector3d position = T_right_left.Inverse().translation;
-  if (!(position.x() > 0) || position.x() < position.tail<2>().norm()) {
+  if (!(position.x() > 0) || position.x() < position.tail<2>().norm())
     throw InputError(
         "stereo calibration: the second camera does not lie to the right of the first; swap the two");
-  }
   // cv::stereoRectify finds the two rotations; they depend on the extrinsics alone, so any intrinsics will do
   // here.
   const cv::Mat k = (cv::Mat_<double>(3, 3) << left.fx, 0, left.cx, 0, left.fy, left.cy, 0, 0, 1);

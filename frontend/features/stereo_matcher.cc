@@ -225,9 +225,8 @@ void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv:
     const cv::Point2f scale(static_cast<float>(whole.cols) / static_cast<float>(reduced.cols),
                             static_cast<float>(whole.rows) / static_cast<float>(reduced.rows));
     if (!Refine(left_pyramid[level], right_pyramid[level], scale, k.pt,
-                right.keypoints[static_cast<std::size_t>(best_j)].pt.x, &refined)) {
+                right.keypoints[static_cast<std::size_t>(best_j)].pt.x, &refined))
       continue;
-    }
     if (refined.disparity < -1.0 || refined.disparity > max_disparity) continue;
     found.push_back({i, std::max(refined.disparity, 0.01), refined.row_error, refined.residual});
   }

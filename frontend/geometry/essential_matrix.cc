@@ -68,10 +68,9 @@ Eigen::Matrix<double, 10, 20> Constraints(const std::array<std::array<Linear, 3>
   const Quadratic half_trace = 0.5 * (square[0][0] + square[1][1] + square[2][2]);
   for (int i = 0; i < 3; ++i) square[i][i] -= half_trace;
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
+    for (int c = 0; c < 3; ++c)
       constraints.row(1 + 3 * r + c) =
           Product(square[r][0], e[0][c]) + Product(square[r][1], e[1][c]) + Product(square[r][2], e[2][c]);
-    }
   }
   return constraints;
 }

@@ -108,8 +108,8 @@ class CameraDataset : public RecordedDataset {
       throw InputError(name_ + ": with sensor stereo, one camera gives both images side by side, but " +
                        SizeText(size_) + " pixels have an odd width; give two cameras (LEFT,RIGHT)");
     if (SideBySide() && size_.width < size_.height)
-      warnings_.push_back(name_ + ": taken as two images of " + SizeText(size_) +
-                          " side by side, as sensor is stereo; for one image set it to mono");
+      Warn("taken as two images of " + SizeText(size_) +
+           " side by side, as sensor is stereo; for one image set it to mono");
     if (!second_) return;
     if (!taken.depth_error.empty()) throw InputError(taken.depth_error);
     const cv::Size second = Depth() ? frame.depth_m.size() : frame.right.size();
@@ -180,11 +180,11 @@ class CameraDataset : public RecordedDataset {
                            (Depth() ? "depth" : "right") + " image has another size than the first";
       second.release();
     }
-    if (rig_.left) frame.image = rig_.left->Apply(frame.image);
-    if (!frame.right.empty() && rig_.right) frame.right = rig_.right->Apply(frame.right);
+    frame.image = Rectified(rig_.left, frame.image);
+    if (!frame.right.empty()) frame.right = Rectified(rig_.right, frame.right);
     if (frame.depth_m.empty()) return;
-    frame.depth_m = DepthInMetres(frame.depth_m, DepthUnits(options_, 0), options_.max_depth_m);
-    if (rig_.left) frame.depth_m = rig_.left->Apply(frame.depth_m, Sampling::kNearest);
+    const cv::Mat metres = DepthInMetres(frame.depth_m, DepthUnits(options_, 0), options_.max_depth_m);
+    frame.depth_m = Rectified(rig_.left, metres, Sampling::kNearest);
   }
 
   bool device_ = false;

@@ -126,8 +126,7 @@ void FolderContents::ReportAlone(const fs::path& list, std::size_t alone, const 
                                  const std::string& some, const DatasetOptions& options) {
   if (alone == frames.size()) throw InputError(list.string() + ": " + none);
   if (alone == 0 || options.follow_s > 0) return;
-  warnings.push_back(list.string() + ": " + std::to_string(alone) + " of " + std::to_string(frames.size()) +
-                     " " + some);
+  warnings.push_back(list.string() + ": " + PartText(alone, frames.size()) + " " + some);
 }
 
 FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& options)
@@ -192,8 +191,7 @@ void FolderDataset::SetUpMasks() {
   if (options_.mask.empty()) return;
   ImageMasks masks(options_.mask);
   if (!masks.PerImage()) {
-    mask_ = masks.OfAll(size_);
-    if (rig_.left) mask_ = rig_.left->Apply(mask_, Sampling::kNearest);
+    mask_ = Rectified(rig_.left, masks.OfAll(size_), Sampling::kNearest);
     return;
   }
   masks_ = std::move(masks);
@@ -219,7 +217,7 @@ void FolderDataset::SetUpMasks() {
 cv::Mat FolderDataset::MaskOf(const fs::path& image) const {
   if (!masks_) return mask_;
   const cv::Mat mask = masks_->Of(image.stem().string(), size_);
-  return mask.empty() || !rig_.left ? mask : rig_.left->Apply(mask, Sampling::kNearest);
+  return mask.empty() ? mask : Rectified(rig_.left, mask, Sampling::kNearest);
 }
 
 // What is wrong with the image that was read from `file`; else `out` gets it, 8 bit and rectified.
@@ -229,17 +227,12 @@ std::string FolderDataset::Rectify(const ImageFile& read, const fs::path& file,
   if (read.image.size() != size_)
     return file.string() + ": has " + SizeText(read.image.size()) +
            " pixels, but the data set's images have " + SizeText(size_);
-  out = To8Bit(read.image, range_);
-  if (rectifier) out = rectifier->Apply(out);
+  out = Rectified(rectifier, To8Bit(read.image, range_));
   return {};
 }
 
 ReadResult FolderDataset::Read(std::size_t i) const {
-  ReadResult result;
-  if (i >= Size()) {
-    result.error = NoFrame(i);
-    return result;
-  }
+  if (i >= Size()) return {std::nullopt, NoFrame(i), {}};
   return ReadFiles(i, contents_.frames[i]);
 }
 

@@ -41,6 +41,11 @@ struct FrameFiles {
   ShortPath image, right, depth;
 };
 
+/// "2 of 9".
+inline std::string PartText(std::size_t part, std::size_t all) {
+  return std::to_string(part) + " of " + std::to_string(all);
+}
+
 /// What a reader finds out about its folder.
 struct FolderContents {
   std::filesystem::path folder;
@@ -132,6 +137,7 @@ class RecordedDataset : public Dataset {
     rig_ = RectifyRig(name_, options_, size_, rate_hz, warnings_);
     mask_ = MaskOfAll(options_, size_, rig_.left);
   }
+  void Warn(const std::string& text) { warnings_.push_back(name_ + ": " + text); }
   std::string About(std::size_t i) const { return name_ + ": frame " + std::to_string(i); }
 
   const std::string name_;  // for messages

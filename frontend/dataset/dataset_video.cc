@@ -28,8 +28,7 @@ void DropRepeated(const std::string& name, VideoTimes& times) {
   times.ticks.erase(std::unique(times.ticks.begin(), times.ticks.end()), times.ticks.end());
   const std::size_t skipped = all - times.ticks.size();
   if (skipped == 0) return;
-  times.notes.push_back(name + ": " + std::to_string(skipped) + " of " + std::to_string(all) +
-                        " frames repeat a time stamp and are skipped");
+  times.notes.push_back(name + ": " + PartText(skipped, all) + " frames repeat a time stamp and are skipped");
   times.skipped_share = static_cast<double>(skipped) / static_cast<double>(all);
 }
 
@@ -188,7 +187,7 @@ class VideoDataset : public RecordedDataset {
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
     InputFrame frame;
-    result.error = Rectified(grey_, i, frame.image);
+    result.error = Fetch(grey_, i, frame.image);
     if (!result.error.empty()) return result;
     frame.index = static_cast<std::int64_t>(i);
     frame.stamp_s = Stamp(i);
@@ -199,17 +198,17 @@ class VideoDataset : public RecordedDataset {
 
   ColourImage ReadColour(std::size_t i) const override {
     ColourImage result;
-    result.error = Rectified(colour_, i, result.image);
+    result.error = Fetch(colour_, i, result.image);
     return result;
   }
 
  private:
   // What is wrong with frame i; else `out` gets it.
-  std::string Rectified(const VideoFrames& frames, std::size_t i, cv::Mat& out) const {
+  std::string Fetch(const VideoFrames& frames, std::size_t i, cv::Mat& out) const {
     const cv::Mat image = i < Size() ? frames.Fetch(i, ticks_) : cv::Mat();
     if (image.empty()) return About(i) + " can't be decoded";
     if (image.size() != size_) return About(i) + " has another size than the first";
-    out = rig_.left ? rig_.left->Apply(image) : image;
+    out = Rectified(rig_.left, image);
     return {};
   }
 

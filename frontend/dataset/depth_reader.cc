@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/rectified_rig.h"
 
 namespace tutti {
 namespace {
@@ -70,7 +71,7 @@ std::string DepthReader::Read(const std::filesystem::path& file, const std::opti
   if (depth.size() != size_ && !Resample(depth))
     return file.string() + ": the depth image has " + SizeText(depth.size()) +
            " pixels, but the colour images have " + SizeText(size_) + "; depth must be registered to colour";
-  metres = rectifier ? rectifier->Apply(depth, Sampling::kNearest) : depth;
+  metres = Rectified(rectifier, depth, Sampling::kNearest);
   return {};
 }
 

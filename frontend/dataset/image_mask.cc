@@ -1,6 +1,7 @@
 #include "frontend/dataset/image_mask.h"
 
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/rectified_rig.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -64,8 +65,7 @@ cv::Mat ImageMasks::OfAll(cv::Size size) const {
 
 cv::Mat MaskOfAll(const DatasetOptions& options, cv::Size size, const std::optional<Rectifier>& rectifier) {
   if (options.mask.empty()) return {};
-  const cv::Mat mask = ImageMasks(options.mask).OfAll(size);
-  return rectifier ? rectifier->Apply(mask, Sampling::kNearest) : mask;
+  return Rectified(rectifier, ImageMasks(options.mask).OfAll(size), Sampling::kNearest);
 }
 
 }  // namespace tutti

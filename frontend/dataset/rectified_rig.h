@@ -34,6 +34,12 @@ inline PinholeCamera Pinhole(double fx, double fy, double cx, double cy, cv::Siz
   return camera;
 }
 
+/// The image as the rectifier makes it, or as it is.
+inline cv::Mat Rectified(const std::optional<Rectifier>& rectifier, const cv::Mat& image,
+                         Sampling sampling = Sampling::kLinear) {
+  return rectifier ? rectifier->Apply(image, sampling) : image;
+}
+
 /// The camera with this horizontal field of view [deg]: square pixels, principal point in the middle.
 PinholeCamera CameraOfView(double degrees, cv::Size size);
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <string_view>
 #include <tuple>
 
 #include "frontend/dataset/chunked_bag.h"

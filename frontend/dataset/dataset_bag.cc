@@ -4,8 +4,6 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
-#include <string>
-#include <utility>
 
 #include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"

@@ -1,10 +1,8 @@
 // Live cameras: camera:0, a pair camera:0,1, a stream rtsp://...; or videos in their stead: camera:FILE, a
 // pipe. Frames come once, in order.
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <chrono>
-#include <map>
 #include <mutex>
 
 #include "core/stopwatch.h"

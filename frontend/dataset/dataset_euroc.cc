@@ -1,7 +1,6 @@
 // EuRoC ASL: mav0/cam0, mav0/cam1 with sensor.yaml and data.csv.
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "core/camera_text.h"
 #include "core/time_stamps.h"

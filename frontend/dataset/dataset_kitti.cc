@@ -1,6 +1,5 @@
 // KITTI odometry: image_0 (and image_1), times.txt, calib.txt, poses.txt.
 #include <cmath>
-#include <map>
 
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"

@@ -1,7 +1,6 @@
 // Images in folders side by side, or in one: the layouts of layout.h.
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"

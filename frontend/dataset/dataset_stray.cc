@@ -1,7 +1,6 @@
 // Stray Scanner (iPhone): rgb.mp4, camera_matrix.csv, odometry.csv, depth/*.png in millimetres, smaller than
 // the video's images and of the same view. https://docs.strayrobots.io/apps/scanner/format.html
 #include <cmath>
-#include <map>
 
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"

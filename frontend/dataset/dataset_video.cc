@@ -1,8 +1,6 @@
 // A video file. Decoders are sequential, so random access is emulated: frames that a reader thread skips over
 // are kept for a while for its neighbours, and going far back starts from the beginning.
 #include <algorithm>
-#include <functional>
-#include <map>
 #include <mutex>
 #include <set>
 

@@ -1,8 +1,6 @@
 // ROS 1 bags of format 2.0 (wiki.ros.org/Bags/Format/2.0), plain, LZ4 or BZ2.
 #include <algorithm>
 #include <cstring>
-#include <optional>
-#include <string>
 
 #include "frontend/dataset/chunked_bag.h"
 #include "tutti/core/error.h"

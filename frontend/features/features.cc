@@ -1,8 +1,5 @@
 #include "frontend/features/features.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <cstring>
 #include <numeric>
 #include <opencv2/features2d.hpp>

@@ -1,7 +1,6 @@
 #include "frontend/geometry/image_aligner.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <utility>

@@ -1,11 +1,10 @@
-#include "frontend/features/corner_detector.h"
-
+// Corners of one level of a pyramid, spread over it by a grid.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 
 #include "core/fast_corners.h"
+#include "frontend/features/features.h"
 
 namespace tutti {
 namespace {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "tutti/core/error.h"
@@ -110,21 +111,14 @@ StereoRectification RectifyStereo(const PinholeCamera& left, const PinholeCamera
   // cv::stereoRectify finds the two rotations; they depend on the extrinsics alone, so any intrinsics will do
   // here.
   const cv::Mat k = (cv::Mat_<double>(3, 3) << left.fx, 0, left.cx, 0, left.fy, left.cy, 0, 0, 1);
-  cv::Mat rotation(3, 3, CV_64F), translation(3, 1, CV_64F), r_left, r_right, p_left, p_right, q;
-  const Eigen::Matrix3d R = T_right_left.rotation.toRotationMatrix();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) rotation.at<double>(i, j) = R(i, j);
-    translation.at<double>(i) = T_right_left.translation(i);
-  }
+  cv::Mat rotation, translation, r_left, r_right, p_left, p_right, q;
+  cv::eigen2cv(T_right_left.rotation.toRotationMatrix(), rotation);
+  cv::eigen2cv(T_right_left.translation, translation);
   cv::stereoRectify(k, cv::noArray(), k, cv::noArray(), cv::Size(left.width, left.height), rotation,
                     translation, r_left, r_right, p_left, p_right, q);
   Eigen::Matrix3d R_left, R_right;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      R_left(i, j) = r_left.at<double>(i, j);
-      R_right(i, j) = r_right.at<double>(i, j);
-    }
-  }
+  cv::cv2eigen(r_left, R_left);
+  cv::cv2eigen(r_right, R_right);
   const View a = InnerView(left, R_left), b = InnerView(right, R_right);
   const View common{std::max(a.left, b.left), std::min(a.right, b.right), std::max(a.top, b.top),
                     std::min(a.bottom, b.bottom)};

@@ -1,5 +1,4 @@
-#include "apps/export/track_completion.h"
-
+// Cleaner and longer tracks, for programs that have nothing but tracks.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,6 +7,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "apps/export/colmap_model.h"
 #include "core/median.h"
 
 namespace tutti {

@@ -8,7 +8,6 @@
 
 #include "apps/export/colmap_model.h"
 #include "apps/export/keyframe_images.h"
-#include "apps/export/track_completion.h"
 #include "tests/apps/export/colmap_files.h"
 #include "tests/apps/export/mapped_room.h"
 #include "tests/support/test_data.h"

@@ -1,5 +1,5 @@
 // Views that are dropped, and views that are found in the images.
-#include "apps/export/track_completion.h"
+#include "apps/export/colmap_model.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,7 @@
-#include "apps/export/ply_file.h"
+#include "apps/export/map_files.h"
 
-#include <string>
+#include <nlohmann/json.hpp>
 
-#include "apps/export/little_endian.h"
 #include "core/median.h"
 #include "core/replaced_file.h"
 
@@ -41,6 +40,16 @@ std::array<Eigen::Vector3d, kCorners> Frustum(const PinholeCamera& camera, doubl
            depth * camera.Unproject({left, bottom})}};
 }
 
+// T_world_camera with y and z of the camera turned round: OpenCV's axes to OpenGL's.
+nlohmann::ordered_json OpenGlPose(const Pose& T_world_camera) {
+  Eigen::Matrix4d matrix = T_world_camera.Matrix();
+  matrix.col(1) *= -1;
+  matrix.col(2) *= -1;
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (int r = 0; r < 4; ++r) rows.push_back({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)});
+  return rows;
+}
+
 }  // namespace
 
 void WritePly(const std::filesystem::path& file, const MapModel& model, PlyCameras cameras) {
@@ -72,6 +81,30 @@ void WritePly(const std::filesystem::path& file, const MapModel& model, PlyCamer
     }
   }
   internal::WriteFile(file, bytes);
+}
+
+std::string NerfTransforms(const MapModel& model, const std::vector<std::size_t>& chosen,
+                           const std::string& points) {
+  const PinholeCamera& camera = model.camera;
+  nlohmann::ordered_json json = {{"camera_model", "OPENCV"},
+                                 {"w", camera.width},
+                                 {"h", camera.height},
+                                 {"fl_x", camera.fx},
+                                 {"fl_y", camera.fy},
+                                 {"cx", camera.cx + 0.5},
+                                 {"cy", camera.cy + 0.5},
+                                 {"k1", 0.0},
+                                 {"k2", 0.0},
+                                 {"p1", 0.0},
+                                 {"p2", 0.0},
+                                 {"ply_file_path", points}};
+  json["frames"] = nlohmann::ordered_json::array();
+  for (const std::size_t k : chosen) {
+    const ModelKeyframe& keyframe = model.keyframes[k];
+    json["frames"].push_back({{"file_path", "images/" + ImageName(keyframe.frame_index)},
+                              {"transform_matrix", OpenGlPose(keyframe.T_world_camera)}});
+  }
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace tutti

@@ -3,10 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "apps/plot/plot.h"
-#include "apps/plot/plot_heat.h"
-#include "apps/plot/plot_legend.h"
-#include "apps/plot/plot_picture.h"
+#include "apps/plot/plot_lines.h"
 
 namespace tutti {
 namespace {
@@ -130,6 +127,17 @@ void AddHeat(const TrajectoryPlot& plot, const View& view, const PlotAxes& axes,
 
 }  // namespace
 
+const char* PlotPalette(std::size_t k) {
+  static constexpr const char* kColors[kPlotPaletteSize] = {"#0072b2", "#d55e00", "#009e73",
+                                                            "#cc79a7", "#e69f00", "#56b4e9"};
+  return kColors[k % kPlotPaletteSize];
+}
+
+const char* SessionColor(std::size_t k) {
+  static constexpr std::array kColors = {"#cc79a7", "#56b4e9", "#8f7d2f", "#999999", "#7a5195", "#5a9a8f"};
+  return kColors[k % kColors.size()];
+}
+
 std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
   std::vector<NamedLine> lines, others;
   bool heat = false;
@@ -189,7 +197,7 @@ std::vector<PlotShape> LayOut(const CurvePlot& plot) {
   AddAxes(axes, shapes);
   std::vector<NamedLine> lines;
   for (const PlotCurve& curve : plot.curves) {
-    lines.push_back({curve.name, {}, curve.color, curve.width, curve.dashed});
+    lines.push_back(LineOf(curve));
     for (const Eigen::Vector2d& p : curve.points) {
       if (p.allFinite()) lines.back().points.push_back(axes.Page(p));
     }

@@ -66,7 +66,7 @@ class BinaryForm {
 };
 
 template <class Form>
-void WriteCameras(const PinholeCamera& camera, const std::filesystem::path& folder) {
+void WriteCamerasFile(const PinholeCamera& camera, const std::filesystem::path& folder) {
   Form out(
       "# Camera list with one line of data per camera:\n"
       "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
@@ -81,7 +81,7 @@ void WriteCameras(const PinholeCamera& camera, const std::filesystem::path& fold
 }
 
 template <class Form>
-void WriteImages(const ColmapModel& model, const std::filesystem::path& folder) {
+void WriteImagesFile(const ColmapModel& model, const std::filesystem::path& folder) {
   Form out(
       "# Image list with two lines of data per image:\n"
       "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
@@ -110,7 +110,7 @@ void WriteImages(const ColmapModel& model, const std::filesystem::path& folder) 
 }
 
 template <class Form>
-void WritePoints(const ColmapModel& model, const std::filesystem::path& folder) {
+void WritePointsFile(const ColmapModel& model, const std::filesystem::path& folder) {
   Form out(
       "# 3D point list with one line of data per point:\n"
       "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n"
@@ -203,12 +203,12 @@ double ColmapModel::MeanTrackLength() const {
 }
 
 void ColmapModel::Write(const std::filesystem::path& folder) const {
-  WriteCameras<TextForm>(camera_, folder);
-  WriteImages<TextForm>(*this, folder);
-  WritePoints<TextForm>(*this, folder);
-  WriteCameras<BinaryForm>(camera_, folder);
-  WriteImages<BinaryForm>(*this, folder);
-  WritePoints<BinaryForm>(*this, folder);
+  WriteCamerasFile<TextForm>(camera_, folder);
+  WriteImagesFile<TextForm>(*this, folder);
+  WritePointsFile<TextForm>(*this, folder);
+  WriteCamerasFile<BinaryForm>(camera_, folder);
+  WriteImagesFile<BinaryForm>(*this, folder);
+  WritePointsFile<BinaryForm>(*this, folder);
 }
 
 }  // namespace tutti

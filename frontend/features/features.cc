@@ -102,20 +102,6 @@ inline int PopCount(std::uint64_t x) {
 
 }  // namespace
 
-const std::vector<cv::Mat>& Pyramid::Levels() const {
-  std::call_once(made_, [this] {
-    if (make_) levels_ = make_();
-    make_ = nullptr;
-  });
-  return levels_;
-}
-
-cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size) {
-  cv::Mat level;
-  cv::resize(image, level, size, 0, 0, cv::INTER_LINEAR);
-  return level;
-}
-
 TUTTI_CLONES("popcnt")
 int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
   int distance = 0;

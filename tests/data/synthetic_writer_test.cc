@@ -15,10 +15,7 @@
 
 namespace tutti {
 namespace {
-
-using testing::FreshFolder;
-using testing::SmallWorld;
-using testing::With;
+using testing::FreshFolder, testing::SmallWorld, testing::With;
 
 TEST(SyntheticWriter, WrittenStereoTownIsReadBackByTheKittiReader) {
   SyntheticOptions options = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kStereo);

@@ -19,9 +19,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::ErrorOf;
-using testing::FreshFile;
-using testing::FreshFolder;
+using testing::ErrorOf, testing::FreshFile, testing::FreshFolder;
 using ::testing::HasSubstr;
 
 fs::path OfOthers(const std::string& name) {

@@ -13,19 +13,11 @@
 
 namespace tutti {
 namespace {
+using ::testing::AllOf, ::testing::HasSubstr;
+using testing::FreshFolder, testing::MakeKitti, testing::OpenError, testing::Picture, testing::Truncate,
+    testing::With, testing::WriteImage, testing::WriteText;
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using tutti::testing::FreshFolder;
-using tutti::testing::MakeKitti;
-using tutti::testing::OpenError;
-using tutti::testing::Picture;
-using tutti::testing::Truncate;
-using tutti::testing::With;
-using tutti::testing::WriteImage;
-using tutti::testing::WriteText;
-
-const std::string kNone = "";
+const std::string kNone = "no error";
 
 TEST(DatasetBadInputTest, MissingAndEmptyFoldersAreNamed) {
   const auto folder = FreshFolder();

@@ -12,13 +12,9 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FreshFolder;
+using testing::FrameOf, testing::FreshFolder, testing::ImageMessage, testing::OpenError, testing::Picture,
+    testing::With;
 using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::With;
-
-using testing::ImageMessage;
-using testing::Picture;
 
 const fs::path& FourFrames() {
   static const fs::path file = [] {
@@ -57,10 +53,9 @@ TEST(BagDataset, ColourWithStampsOfTheHeadersAndTheCameraInfo) {
   EXPECT_TRUE(dataset->Rig().calibrated);
   EXPECT_DOUBLE_EQ(dataset->Rig().camera.fx, 60);
   EXPECT_NEAR(dataset->Rig().rate_hz, 10, 1e-3);
-  const ReadResult read = dataset->Read(1);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(read.frame->image.type(), CV_8UC1);
-  EXPECT_NEAR(read.frame->image.at<unsigned char>(10, 10), 0.114 * 200, 1);
+  const InputFrame read = FrameOf(*dataset, 1);
+  EXPECT_EQ(read.image.type(), CV_8UC1);
+  EXPECT_NEAR(read.image.at<unsigned char>(10, 10), 0.114 * 200, 1);
   const ColourImage colour = dataset->ReadColour(1);
   ASSERT_EQ(colour.image.type(), CV_8UC3) << colour.error;
   EXPECT_EQ(colour.image.at<cv::Vec3b>(10, 10), cv::Vec3b(200, 0, 0));
@@ -72,9 +67,8 @@ TEST(BagDataset, SixteenBitIsScaledAndRepeatedStampsAreSkipped) {
   ASSERT_EQ(dataset->Size(), 4u);
   EXPECT_FALSE(dataset->Rig().calibrated);
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("repeat a time stamp"));
-  const ReadResult read = dataset->Read(2);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
+  const InputFrame read = FrameOf(*dataset, 2);
+  EXPECT_EQ(cv::norm(read.image, Picture(64, 48, 2), cv::NORM_INF), 0);
 }
 
 TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
@@ -85,10 +79,9 @@ TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 images of /colour/image_raw have no depth"));
   ASSERT_TRUE(dataset->Read(2).frame.has_value());
   EXPECT_TRUE(dataset->Read(2).frame->depth_m.empty());
-  const ReadResult read = dataset->Read(3);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(read.frame->index, 3);
-  EXPECT_FLOAT_EQ(read.frame->depth_m.at<float>(5, 5), 1.5F);
+  const InputFrame read = FrameOf(*dataset, 3);
+  EXPECT_EQ(read.index, 3);
+  EXPECT_FLOAT_EQ(read.depth_m.at<float>(5, 5), 1.5F);
 }
 
 TEST(BagDataset, TopicsThatAreMissingAreListed) {
@@ -261,9 +254,8 @@ TEST(BagDataset, TheMaskIsOfEveryFrame) {
   mask.rowRange(40, 48).setTo(0);
   options.mask = FreshFolder() / "mask.png";
   testing::WriteImage(options.mask, mask);
-  const ReadResult read = OpenDataset(FourFrames(), options)->Read(1);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(cv::countNonZero(read.frame->mask != mask), 0);
+  const InputFrame read = FrameOf(*OpenDataset(FourFrames(), options), 1);
+  EXPECT_EQ(cv::countNonZero(read.mask != mask), 0);
 }
 
 TEST(BagDataset, OfRos2ByItsFileAndByItsFolder) {

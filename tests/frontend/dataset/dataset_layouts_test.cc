@@ -14,17 +14,9 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using ::testing::Not;
-using tutti::testing::FreshFolder;
-using tutti::testing::OpenError;
-using tutti::testing::Picture;
-using tutti::testing::SmallCamera;
-using tutti::testing::Truncate;
-using tutti::testing::With;
-using tutti::testing::WriteImage;
-using tutti::testing::WriteText;
+using ::testing::Contains, ::testing::HasSubstr, ::testing::Not;
+using testing::FreshFolder, testing::OpenError, testing::Picture, testing::SmallCamera, testing::Truncate,
+    testing::With, testing::WriteImage, testing::WriteText;
 
 std::string Number(int i, int digits = 6) {
   const std::string text = std::to_string(i);

@@ -13,15 +13,9 @@
 
 namespace tutti {
 namespace {
-
+using testing::FrameOf, testing::FreshFolder, testing::MakeKitti, testing::OpenError, testing::Picture,
+    testing::With, testing::WriteImage, testing::WriteText;
 using ::testing::HasSubstr;
-using tutti::testing::FreshFolder;
-using tutti::testing::MakeKitti;
-using tutti::testing::OpenError;
-using tutti::testing::Picture;
-using tutti::testing::With;
-using tutti::testing::WriteImage;
-using tutti::testing::WriteText;
 
 TEST(DatasetTest, KittiStereoHasCalibrationBaselineStampsAndPoses) {
   const auto folder = FreshFolder();
@@ -33,10 +27,9 @@ TEST(DatasetTest, KittiStereoHasCalibrationBaselineStampsAndPoses) {
   EXPECT_DOUBLE_EQ(data->Rig().baseline_m, 0.5);
   EXPECT_NEAR(data->Rig().rate_hz, 10, 1e-9);
   EXPECT_DOUBLE_EQ(data->Stamp(3), 0.3);
-  const ReadResult frame = data->Read(2);
-  ASSERT_TRUE(frame.frame) << frame.error;
-  EXPECT_EQ(cv::norm(frame.frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(frame.frame->right, Picture(64, 48, 102), cv::NORM_INF), 0);
+  const InputFrame frame = FrameOf(*data, 2);
+  EXPECT_EQ(cv::norm(frame.image, Picture(64, 48, 2), cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(frame.right, Picture(64, 48, 102), cv::NORM_INF), 0);
   ASSERT_TRUE(data->GroundTruthFile());
   const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
   ASSERT_EQ(truth.size(), 4U);
@@ -92,12 +85,11 @@ TEST(DatasetTest, StartEndAndStrideChooseFramesThatKeepTheirNumbers) {
   ASSERT_EQ(data->Size(), 3U);  // 1, 4, 7
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t number = 1 + 3 * static_cast<std::int64_t>(i);
-    const ReadResult read = data->Read(i);
-    ASSERT_TRUE(read.frame) << read.error;
-    EXPECT_EQ(read.frame->index, number);
+    const InputFrame read = FrameOf(*data, i);
+    EXPECT_EQ(read.index, number);
     EXPECT_EQ(data->Number(i), number);
     EXPECT_DOUBLE_EQ(data->Stamp(i), 0.1 * static_cast<double>(number));
-    EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, static_cast<int>(number)), cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(read.image, Picture(64, 48, static_cast<int>(number)), cv::NORM_INF), 0);
     EXPECT_EQ(FindStamp(*data, data->Stamp(i)), i);
   }
   EXPECT_FALSE(FindStamp(*data, 0.2));
@@ -323,9 +315,8 @@ TEST(DatasetTest, VideoGivesTheSameFramesInAnyOrder) {
   ASSERT_EQ(data->Size(), 20U);
   EXPECT_NEAR(data->Stamp(5), 0.2, 1e-9);
   for (const std::size_t i : {0U, 7U, 3U, 19U, 1U}) {
-    const ReadResult frame = data->Read(i);
-    ASSERT_TRUE(frame.frame) << frame.error;
-    EXPECT_NEAR(frame.frame->image.at<unsigned char>(20, 20), 10.0 * static_cast<double>(i), 3);
+    const InputFrame frame = FrameOf(*data, i);
+    EXPECT_NEAR(frame.image.at<unsigned char>(20, 20), 10.0 * static_cast<double>(i), 3);
   }
 }
 
@@ -367,10 +358,9 @@ TEST(DatasetTest, RealRedkitchen) {
   options.camera->height = 480;
   const auto data = OpenDataset(path, options);
   EXPECT_EQ(data->Size(), 500U);
-  const ReadResult frame = data->Read(100);
-  ASSERT_TRUE(frame.frame) << frame.error;
+  const InputFrame frame = FrameOf(*data, 100);
   double most = 0;
-  cv::minMaxLoc(frame.frame->depth_m, nullptr, &most);
+  cv::minMaxLoc(frame.depth_m, nullptr, &most);
   EXPECT_GT(most, 1);
   EXPECT_LT(most, 14);
 }
@@ -386,13 +376,12 @@ TEST(DatasetTest, RealEurocPairsAreRectified) {
   const auto data = OpenDataset(path, With(Sensor::kStereo));
   ASSERT_EQ(data->Size(), 95U);
   EXPECT_NEAR(data->Rig().baseline_m, 0.11, 0.001);
-  const ReadResult read = data->Read(50);
-  ASSERT_TRUE(read.frame) << read.error;
+  const InputFrame read = FrameOf(*data, 50);
   const auto orb = cv::ORB::create(1500);
   std::vector<cv::KeyPoint> left, right;
   cv::Mat left_descriptors, right_descriptors;
-  orb->detectAndCompute(read.frame->image, cv::noArray(), left, left_descriptors);
-  orb->detectAndCompute(read.frame->right, cv::noArray(), right, right_descriptors);
+  orb->detectAndCompute(read.image, cv::noArray(), left, left_descriptors);
+  orb->detectAndCompute(read.right, cv::noArray(), right, right_descriptors);
   std::vector<cv::DMatch> matches;
   cv::BFMatcher(cv::NORM_HAMMING, true).match(left_descriptors, right_descriptors, matches);
   std::vector<double> rows;

@@ -15,13 +15,8 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using testing::FreshFolder;
-using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::Picture;
-using testing::With;
-using testing::WriteImage;
+using ::testing::AllOf, ::testing::HasSubstr;
+using testing::FreshFolder, testing::OpenError, testing::Picture, testing::With, testing::WriteImage;
 
 // The lower 10 of 48 rows are not used.
 cv::Mat LowerRows(cv::Size size = {64, 48}) {

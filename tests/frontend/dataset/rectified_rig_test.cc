@@ -9,11 +9,8 @@
 
 namespace tutti {
 namespace {
-
-using ::testing::AllOf;
-using testing::ErrorOf;
-using ::testing::HasSubstr;
-using testing::With;
+using ::testing::AllOf, ::testing::HasSubstr;
+using testing::ErrorOf, testing::With;
 
 const cv::Size kSize(64, 48);
 

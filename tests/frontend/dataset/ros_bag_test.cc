@@ -15,10 +15,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::BagPacking;
-using testing::BagWriter;
-using testing::ErrorOf;
-using testing::FreshFile;
+using testing::BagPacking, testing::BagWriter, testing::ErrorOf, testing::FreshFile;
 using ::testing::HasSubstr;
 
 std::string Message(int i) { return std::string(12, '\0') + "message " + std::to_string(i); }

@@ -13,14 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf, ::testing::ElementsAre, ::testing::HasSubstr;
-using testing::FrameOf, testing::FreshFolder, testing::OpenError, testing::Picture, testing::With,
-    testing::WriteImage;
+using testing::Difference, testing::FrameOf, testing::FreshFolder, testing::OpenError, testing::Picture,
+    testing::With, testing::WriteImage;
 
 bool NeverStop() { return false; }
-
-double MostDifference(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
-}
 
 // Without loss. False if this OpenCV can't.
 bool WriteVideo(const fs::path& file, const std::vector<cv::Mat>& images) {
@@ -74,8 +70,8 @@ TEST_F(CameraPair, OfRectifiedFilesGivesTheFramesOfAFolder) {
     ASSERT_TRUE(read.frame.has_value()) << read.error;
     EXPECT_EQ(read.depth_error, "");
     EXPECT_NEAR(read.frame->stamp_s, static_cast<double>(i) / 25, 1e-9);
-    EXPECT_EQ(MostDifference(read.frame->image, other.frame->image), 0);
-    EXPECT_EQ(MostDifference(read.frame->right, other.frame->right), 0);
+    EXPECT_EQ(Difference(read.frame->image, other.frame->image), 0);
+    EXPECT_EQ(Difference(read.frame->right, other.frame->right), 0);
   }
   EXPECT_FALSE(live->WaitFor(5, NeverStop));
   EXPECT_THAT(live->Read(0).error, HasSubstr("come once"));
@@ -96,8 +92,8 @@ TEST_F(CameraPair, InOneImageIsCutInTheMiddle) {
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(dataset->WaitFor(static_cast<std::size_t>(i), NeverStop));
     const InputFrame read = FrameOf(*dataset, static_cast<std::size_t>(i));
-    EXPECT_EQ(MostDifference(read.image, Picture(64, 48, i)), 0);
-    EXPECT_EQ(MostDifference(read.right, Picture(64, 48, 100 + i)), 0);
+    EXPECT_EQ(Difference(read.image, Picture(64, 48, i)), 0);
+    EXPECT_EQ(Difference(read.right, Picture(64, 48, 100 + i)), 0);
     EXPECT_EQ(read.mask.size(), cv::Size(64, 48));
   }
 }
@@ -114,11 +110,7 @@ TEST_F(CameraPair, OfASingleImageCutInTheMiddleIsTold) {
 // Two cameras with lenses, turned against each other, that see bright points.
 struct RawPair {
   RawPair() {
-    left.width = 320;
-    left.height = 240;
-    left.fx = left.fy = 200;
-    left.cx = 158;
-    left.cy = 121;
+    left = Pinhole(200, 200, 158, 121, {320, 240});
     left.distortion = Distortion::kRadTan;
     left.coefficients = {-0.2, 0.05, 0.001, -0.001, 0};
     right = left;
@@ -208,7 +200,7 @@ TEST_F(CameraPair, OfColourAndDepthIsInMetres) {
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(dataset->WaitFor(static_cast<std::size_t>(i), NeverStop));
     const InputFrame read = FrameOf(*dataset, static_cast<std::size_t>(i));
-    EXPECT_EQ(MostDifference(read.image, Picture(64, 48, i)), 0);
+    EXPECT_EQ(Difference(read.image, Picture(64, 48, i)), 0);
     EXPECT_TRUE(read.right.empty());
     ASSERT_EQ(read.depth_m.type(), CV_32FC1);
     EXPECT_FLOAT_EQ(read.depth_m.at<float>(2, 5), 5.0F + 0.001F * static_cast<float>(i));
@@ -244,8 +236,7 @@ TEST_F(CameraPair, WithAFileThatHasACommaInItsNameIsOneFile) {
   const std::string name = "camera:" + (folder_ / "a,b.mkv").string();
   EXPECT_THAT(CameraSources(name), ElementsAre((folder_ / "a,b.mkv").string()));
   EXPECT_EQ(
-      MostDifference(OpenDataset(name, With(Sensor::kMono, true))->Read(0).frame->image, Picture(64, 48, 7)),
-      0);
+      Difference(OpenDataset(name, With(Sensor::kMono, true))->Read(0).frame->image, Picture(64, 48, 7)), 0);
 }
 
 TEST_F(CameraPair, ThatDoesNotFitTogetherIsRefused) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/dataset/image_file.h"
 #include "frontend/dataset/rectified_rig.h"
 #include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
@@ -81,12 +82,12 @@ inline double Difference(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
 }
 
-/// Motion JPEG, which loses a little. False if this OpenCV can't.
+/// Motion JPEG (.avi), which loses a little. False if this OpenCV can't.
 inline bool WriteMotionJpeg(const std::filesystem::path& file, const std::vector<cv::Mat>& images,
                             double rate_hz = 25) {
-  cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), rate_hz,
-                         images.front().size(), images.front().channels() == 3);
-  for (const cv::Mat& image : images) writer.write(image);
+  cv::VideoWriter writer(file.string(), cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'),
+                         rate_hz, images.front().size());
+  for (const cv::Mat& image : images) writer.write(ToColour(image));
   return writer.isOpened();
 }
 

@@ -2,8 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <opencv2/videoio.hpp>
-
 #include "tests/frontend/dataset/dataset_files.h"
 #include "tests/support/test_data.h"
 
@@ -114,12 +112,9 @@ class Camera : public ::testing::Test {
  protected:
   void SetUp() override {
     file_ = FreshFolder() / "camera.avi";
-    cv::VideoWriter writer(file_.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
-    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
-    for (int i = 0; i < 5; ++i) {
-      cv::Mat image(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20));
-      writer.write(image);
-    }
+    std::vector<cv::Mat> images;
+    for (int i = 0; i < 5; ++i) images.emplace_back(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20));
+    if (!testing::WriteMotionJpeg(file_, images)) GTEST_SKIP() << "this OpenCV can't write a video";
   }
   fs::path file_;
 };

@@ -22,7 +22,7 @@ struct ModelKeyframe {
   std::int64_t frame_index = 0;  ///< number in the map (MapSession::frame_offset)
   double stamp_s = 0;
   Pose T_world_camera;  ///< camera: x right, y down, z forward
-  /// Of MapModel::landmarks, in the order of the features; the centre of the top-left pixel is (0, 0).
+  /// They see MapModel::landmarks, in the order of the features; the centre of the top-left pixel is (0, 0).
   std::vector<SeenLandmark> views;
 };
 

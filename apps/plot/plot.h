@@ -91,8 +91,8 @@ std::vector<Eigen::Vector2d> DensityOf(const std::vector<double>& values, std::s
 /// the 7th series on colours repeat; draw those dashed.
 const char* PlotPalette(std::size_t k);
 constexpr std::size_t kPlotPaletteSize = 6;
-/// Of the k-th recording that a map held before, in every picture and page (view.js, base.js); none is that
-/// of a run's own trajectory.
+/// Colour of the k-th recording that a map held before, in every picture and page (view.js, base.js); none is
+/// that of a run's own trajectory.
 const char* SessionColor(std::size_t k);
 
 /// The shapes of a plot on a page of kPlotWidth x kPlotHeight. Points that are not finite are left out.

@@ -51,7 +51,7 @@ void WriteImage(const fs::path& file, const cv::Mat& image) {
 constexpr const char* kImageFolders[] = {"image_0", "image_1", "images", "rgb", "depth"};
 constexpr const char* kWritten = "# Written by `tutti generate`";
 
-// As NumberName and StampName make it: at least six digits, or a number with six decimals.
+// NumberName and StampName make such names: at least six digits, or a number with six decimals.
 bool IsOwnName(const std::string& name) {
   constexpr const char* kDigits = "0123456789";
   const std::size_t digits = std::min(name.find_first_not_of(kDigits), name.size());

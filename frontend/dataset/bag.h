@@ -26,9 +26,8 @@ struct BagMessage {
   std::uint64_t begin = 0;  ///< in the unpacked chunk, or in the file; of a database: its row
   std::int32_t chunk = -1;  ///< that is compressed; -1: none
   std::uint32_t part = 0;   ///< of a recording in several files
-  /// Of its header, for messages that begin with one (std_msgs/Header); nan where the message is compressed.
-  double stamp_s = 0;
-  double received_s = 0;  ///< when the recorder got it
+  double stamp_s = 0;       ///< in its header (std_msgs/Header); nan where the message is compressed
+  double received_s = 0;    ///< when the recorder got it
 };
 
 /// The messages of a recording. Indices in it are not needed: one that was cut off while recording gives what

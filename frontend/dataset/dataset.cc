@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Nothing where none is seen.
 std::optional<DatasetType> DetectedType(const fs::path& path) {
   try {
     return DetectDatasetType(path);
@@ -125,7 +124,7 @@ FolderContents FindImages(const fs::path& folder, const DatasetOptions& options)
   const std::vector<fs::path> files = FramesIn(folder, false, &out.warnings);
   if (files.empty()) throw InputError(folder.string() + ": holds no images (png, jpg, webp, ...)");
   const internal::StampsOfNames named = StampsInNames(files);
-  // Of a folder that grows, the unit must show in the first names.
+  // In a folder that grows, the first names must show the unit.
   constexpr double kSince1970_s = 5e8;
   const bool has_stamps = named.stamps.size() == files.size() &&
                           (options.follow_s == 0 || named.stamps.front().first >= kSince1970_s);

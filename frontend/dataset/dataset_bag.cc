@@ -81,7 +81,6 @@ class BagDataset : public RecordedDataset {
     }
   }
 
-  // Topics that the options leave open, and all that are there for messages.
   void FindTopics() {
     std::vector<std::string> images;
     std::string list;
@@ -108,7 +107,6 @@ class BagDataset : public RecordedDataset {
     check(stereo ? "right_topic" : "depth_topic", other_topic_);
   }
 
-  // Messages of a topic, with the stamps in their headers.
   Messages Find(const std::string& topic) {
     Messages messages = bag_->Messages(topic);
     const std::size_t stored = messages.size();
@@ -124,7 +122,7 @@ class BagDataset : public RecordedDataset {
     return messages;
   }
 
-  // Of the header of a message that is compressed; nan: it is damaged.
+  // The message is compressed; nan: it is damaged.
   double StampOfPacked(const BagMessage& message) const {
     MessageHead head = {};
     try {
@@ -275,7 +273,6 @@ class BagDataset : public RecordedDataset {
     options_.right = CameraOf(*right, options_.right_topic);
   }
 
-  // From the first image that can be read.
   void FindRig() {
     cv::Mat first;
     std::string error;

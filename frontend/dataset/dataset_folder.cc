@@ -145,8 +145,7 @@ FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& opti
 }
 
 void FolderDataset::FindImageSize() {
-  // The first image may be a damaged one; a folder without any good image among its first ones is not worth a
-  // run.
+  // A folder without any good image among its first ones is not worth a run.
   constexpr std::size_t kTries = 50;
   std::string first_error;
   for (std::size_t i = 0; i < std::min(kTries, Size()); ++i) {
@@ -162,7 +161,7 @@ void FolderDataset::FindImageSize() {
                    " images can be read");
 }
 
-// Of `first`, the first good image, whose place is `place`, and some later ones.
+// Looks at `first`, the first good image, whose place is `place`, and at some later ones.
 void FolderDataset::FindRange(std::size_t place, const cv::Mat& first) {
   constexpr std::size_t kLooked = 8;
   std::vector<cv::Mat> images = {first};

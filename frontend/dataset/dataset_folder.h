@@ -82,7 +82,7 @@ class FolderDataset : public Dataset {
   double Stamp(std::size_t i) const override { return contents_.frames.at(i).stamp_s; }
   ReadResult Read(std::size_t i) const override;
   ColourImage ReadColour(std::size_t i) const override;
-  /// The same for a frame `i` that came later.
+  /// Read frame `i`, which may have come later.
   ReadResult ReadFiles(std::size_t i, const FrameFiles& files) const;
   ColourImage ReadColourOf(const FrameFiles& files) const;
   const std::vector<FrameFiles>& Frames() const { return contents_.frames; }

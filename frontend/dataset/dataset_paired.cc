@@ -18,8 +18,8 @@ std::string PlaceOf(const fs::path& folder, const ImageRole& role) {
 // The first of the numbers of a name.
 std::string FirstNumber(const std::string& key) { return key.substr(0, key.find(' ')); }
 
-// Of each left image the one of the other role, or -1: by the numbers of their names, else by the first of
-// them (Redwood: number and time), else by the times that they are called by.
+// The image of the other role that belongs to each left one, or -1: by the numbers of their names, else by
+// the first of them (Redwood: number and time), else by the times that they are called by.
 std::vector<int> Partners(const std::vector<RoleImage>& left, const std::vector<RoleImage>& other,
                           double limit_s) {
   const auto by = [&](auto key_of) {

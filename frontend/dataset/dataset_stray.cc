@@ -65,7 +65,7 @@ class StrayDataset : public Dataset {
   const std::vector<std::string>& Warnings() const override { return warnings_; }
 
  private:
-  // Of the lines of odometry.csv, which name their frames; without it, the video's own.
+  // The lines of odometry.csv have stamps and name their frames; without it, the video's own are used.
   void FindStamps() {
     std::error_code ignored;
     if (!fs::is_regular_file(truth_.place, ignored)) {

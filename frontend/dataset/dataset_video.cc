@@ -109,7 +109,7 @@ class VideoFrames {
   }
 
  private:
-  // Of the frame that was grabbed last; nothing: the container does not list it.
+  // The frame is that which was grabbed last; nothing: the container does not list it.
   std::optional<std::size_t> NumberOf(const std::vector<std::int64_t>& ticks) const {
     const std::optional<std::int64_t> here = video_->Ticks();
     if (ticks.empty() || !here) return next_;

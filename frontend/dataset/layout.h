@@ -102,7 +102,6 @@ struct LayoutCalibration {
 /// `size`: of the images. Throws InputError.
 LayoutCalibration ReadLayoutCalibration(const std::filesystem::path& folder, const FoundLayout& found,
                                         cv::Size size);
-/// The same of KITTI raw.
 LayoutCalibration ReadKittiRawCalibration(const std::filesystem::path& folder, const FoundLayout& found,
                                           cv::Size size);
 
@@ -112,7 +111,8 @@ struct TumLists {
   const char* depth = "depth.txt";  ///< OpenLORIS: registered depth has a list of its own
 };
 TumLists TumListsOf(const std::filesystem::path& folder);
-/// Of data sets in TUM's layout that have a calibration: OpenLORIS (sensors.yaml), ETH3D (calibration.txt).
+/// Reads the calibration that data sets in TUM's layout may have: OpenLORIS (sensors.yaml), ETH3D
+/// (calibration.txt).
 LayoutCalibration ReadTumCalibration(const std::filesystem::path& folder);
 
 /// One camera of an ASL data set.

@@ -55,7 +55,7 @@ inline std::string NoCalibrationText(const std::string& name) {
 RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, const DatasetOptions& options,
                         cv::Size size, double rate_hz);
 
-/// The same with what `options` say alone; adds NoCalibrationText to `warnings` where they have none.
+/// Uses what `options` say alone; adds NoCalibrationText to `warnings` where they have none.
 RectifiedRig RectifyRig(const std::string& name, const DatasetOptions& options, cv::Size size, double rate_hz,
                         std::vector<std::string>& warnings);
 

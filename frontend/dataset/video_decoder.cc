@@ -58,7 +58,7 @@ bool IsOfSensor(const PinholeCamera& camera, cv::Size own, cv::Size turned) {
   return OffCentre(camera, turned) > 0.1 && OffCentre(camera, own) < OffCentre(camera, turned);
 }
 
-// The same camera with pixels that are so many times as wide.
+// The pixels become so many times as wide.
 PinholeCamera Widened(PinholeCamera camera, double aspect, int width) {
   camera.fx /= aspect;
   camera.cx = (camera.cx + 0.5) / aspect - 0.5;

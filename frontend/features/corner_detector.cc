@@ -120,7 +120,7 @@ class CornerGrid {
  private:
   static constexpr Rank kNone = ~Rank{0};
 
-  // Of a cell, or of the one behind a row's last.
+  // `column` may be the one behind a row's last.
   std::size_t PlaceOf(int row, int column) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);

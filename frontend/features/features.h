@@ -67,7 +67,7 @@ struct DepthGrid {
   Eigen::Vector2d PixelOf(int row, int column) const {
     return {step / 2 + column * step, step / 2 + row * step};
   }
-  /// Of the element nearest to a pixel, without its sign.
+  /// The element nearest to a pixel, without its sign.
   float Near(const Eigen::Vector2d& pixel) const {
     const int first = step / 2;
     const auto nearest = [&](double at, int count) {

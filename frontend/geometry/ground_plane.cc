@@ -67,7 +67,7 @@ RowPart PartOf(const PinholeCamera& camera, const cv::Mat& image, const Field& f
   return {row, static_cast<int>(std::ceil(from)), static_cast<int>(std::floor(to))};
 }
 
-// Of what the plane says is ground, at most so many pixels on a regular grid.
+// Takes at most so many pixels, on a regular grid, of what the plane says is ground.
 std::vector<Pixel> GroundPixels(const PinholeCamera& camera, const cv::Mat& image,
                                 const Eigen::Vector3d& plane, double most) {
   const Field field = LookedAt(plane);

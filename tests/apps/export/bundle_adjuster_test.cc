@@ -58,7 +58,7 @@ std::vector<std::size_t> All(const MapModel& model) {
   return all;
 }
 
-// As `tutti export --colmap` makes it, of all keyframes.
+// `tutti export --colmap` makes such a model; this one has all keyframes.
 ColmapModel ColmapOf(const testing::MappedRoom& room) {
   MapModel model = room.Model();
   RefineTracks(KeyframeImages(*room.dataset, model), All(model), &model);

@@ -175,7 +175,7 @@ TEST(Bag, ARecordingInPartsIsOneInTheOrderOfTheirNumbers) {
   EXPECT_THAT(with_damage->damage(), AllOf(HasSubstr("a part is skipped: "), HasSubstr("recording_11.mcap")));
 }
 
-// As 'ros2 bag record --compression-mode message' leaves it.
+// 'ros2 bag record --compression-mode message' leaves such a file.
 TEST(Bag, MessagesThatAreCompressedEachForItselfAreUnpacked) {
   const fs::path file = FreshFolder() / "packed.db3";
   fs::copy_file(OfOthers("sqlite.db3"), file);
@@ -236,7 +236,7 @@ TEST(Bag, WhatIsNoneIsRefused) {
   EXPECT_THAT(Bag::Open(holes)->damage(), HasSubstr("at byte 8"));
 }
 
-// As the fuzzer found one: SQLite would have walked through it for as long as one had patience.
+// The fuzzer found such a file: SQLite would have walked through it for as long as one had patience.
 TEST(Bag, ADatabaseWhosePagesAreARingEnds) {
   EXPECT_THAT(Bag::Open(OfOthers("ring.db3"))->damage(), HasSubstr("rows are not in their order"));
 }

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf, ::testing::HasSubstr;
 using testing::FrameOf, testing::FreshFolder, testing::MatroskaWriter, testing::OpenError, testing::With;
 
-// Of which frame number i is: each is brighter than the one before.
+// Each frame is brighter than the one before.
 cv::Mat Shade(int i) { return cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20 * i + 20)); }
 int NumberOf(const cv::Mat& image) { return static_cast<int>(std::lround((cv::mean(image)[0] - 20) / 20)); }
 

@@ -45,7 +45,7 @@ struct RollingScene {
     }
   }
 
-  /// The same as features, with their depths.
+  /// What is seen as features, with their depths.
   FrameFeatures Features() const {
     FrameFeatures features;
     for (const PointObservation& o : seen) {

@@ -158,7 +158,7 @@ double DirectionError(const std::vector<Eigen::Vector3d>& points, double sigma_p
 TEST(DirectionSigma, IsWhatNoiseDoesToTheDirection) {
   const std::vector<Eigen::Vector3d> points = MatchedScene(kMotion, false, 100, 0).points;
   const double sigma = DirectionSigma(TwoViewCamera(), kMotion, SeenTwice(points, 0.5));
-  // Of two components the larger one is returned: the error of both is 1 to 1.41 times as much.
+  // The larger one of two components is returned: the error of both is 1 to 1.41 times as much.
   const double error = DirectionError(points, 0.5, 60);
   EXPECT_GT(error, 0.8 * sigma);
   EXPECT_LT(error, 1.6 * sigma);

@@ -1,3 +1,5 @@
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,34 +25,24 @@ struct View {
   }
 };
 
-struct Extent {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Vector3d high = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
-  void Add(const Eigen::Vector3d& p) {
-    if (!p.allFinite()) return;
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  bool Empty() const { return !(low.x() <= high.x()); }
-};
-
 View ChooseView(const TrajectoryPlot& plot, const PlotAxes& page) {
-  Extent all, first;
+  Eigen::AlignedBox3d all, first;
   for (const PlotSeries& series : plot.series) {
     for (const Eigen::Vector3d& p : series.points) {
-      all.Add(p);
-      if (&series == &plot.series.front()) first.Add(p);
+      if (!p.allFinite()) continue;
+      all.extend(p);
+      if (&series == &plot.series.front()) first.extend(p);
     }
   }
   View view;
-  if (all.Empty()) return view;
-  const Eigen::Vector3d size = first.Empty() ? all.high - all.low : first.high - first.low;
+  if (all.isEmpty()) return view;
+  const Eigen::Vector3d size = first.isEmpty() ? all.sizes() : first.sizes();
   std::array<int, 3> order = {0, 1, 2};
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size[a] > size[b]; });
   view.axis_x = std::min(order[0], order[1]);
   view.axis_y = std::max(order[0], order[1]);
-  view.center = 0.5 * (view.World(all.low) + view.World(all.high));
-  const Eigen::Vector2d extent = (view.World(all.high) - view.World(all.low)).cwiseMax(1e-9);
+  view.center = 0.5 * (view.World(all.min()) + view.World(all.max()));
+  const Eigen::Vector2d extent = (view.World(all.max()) - view.World(all.min())).cwiseMax(1e-9);
   view.scale = 0.94 * ((page.bottom_right - page.top_left).array() / extent.array()).minCoeff();
   return view;
 }

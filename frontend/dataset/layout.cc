@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "frontend/dataset/image_file.h"
@@ -14,13 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using AddLayout = std::function<Layout&(const char* name, ImageRole left, ImageRole right, ImageRole depth,
+                                        const char* sign)>;
+
 // The data sets' own pages and tools are the source of units, cameras and conventions.
-std::vector<Layout> MakeLayouts() {
-  std::vector<Layout> all;
-  const auto add = [&all](const char* name, ImageRole left, ImageRole right, ImageRole depth,
-                          const char* sign = "") -> Layout& {
-    return all.emplace_back(Layout{name, left, right, depth, sign});
-  };
+void AddPublished(const AddLayout& add) {
   for (const auto& [left, right, stamps] :
        {std::array{"image_00/data", "image_01/data", "image_00/timestamps.txt"},
         {"image_02/data", "image_03/data", "image_02/timestamps.txt"}}) {
@@ -41,7 +40,7 @@ std::vector<Layout> MakeLayouts() {
   };
   tartan(add("TartanAir", {"image_left"}, {"image_right"}, {"depth_left"}, "pose_left.txt|depth_left"), 480,
          "pose_left.txt");
-  tartan(add("TartanAir V2", {"image_lcam_front"}, {"image_rcam_front"}, {"depth_lcam_front"}), 640,
+  tartan(add("TartanAir V2", {"image_lcam_front"}, {"image_rcam_front"}, {"depth_lcam_front"}, ""), 640,
          "pose_lcam_front.txt")
       .float_in_png = true;
 
@@ -55,7 +54,7 @@ std::vector<Layout> MakeLayouts() {
       rgbd(add("ScanNet", {"color"}, {}, {"depth"}, "pose"), 1000, 30, {TruthForm::kFiles, "pose"});
   scannet.intrinsics = "intrinsic/intrinsic_color.txt";
   scannet.depth_intrinsics = "intrinsic/intrinsic_depth.txt";
-  rgbd(add("7-Scenes", {"", "frame-*.color"}, {}, {"", "frame-*.depth"}), 1000, 30,
+  rgbd(add("7-Scenes", {"", "frame-*.color"}, {}, {"", "frame-*.depth"}, ""), 1000, 30,
        {TruthForm::kFiles, "", "frame-*.pose"})
       .pairs = true;
   for (const auto& [images, truth, calibration] :
@@ -76,8 +75,13 @@ std::vector<Layout> MakeLayouts() {
   rgbd(add("Stray Scanner", {"rgb"}, {}, {"depth"}, "odometry.csv"), 1000, 0,
        {TruthForm::kOdometry, "odometry.csv"})
       .intrinsics = "camera_matrix.csv";
+}
 
-  // Nobody's in particular.
+// Layouts of nobody in particular.
+void AddAnonymous(const AddLayout& to) {
+  const auto add = [&to](ImageRole left, ImageRole right, ImageRole depth) -> Layout& {
+    return to("", left, right, depth, "");
+  };
   for (const auto& [left, right] : {std::pair("cam0", "cam1"),
                                     {"left", "right"},
                                     {"image_left", "image_right"},
@@ -86,17 +90,25 @@ std::vector<Layout> MakeLayouts() {
                                     {"infra1", "infra2"},
                                     {"l", "r"},
                                     {"L", "R"}})
-    add("", {left}, {right}, {"depth"});
-  for (const char* colour : {"rgb", "color", "colour", "image", "images"}) add("", {colour}, {}, {"depth"});
+    add({left}, {right}, {"depth"});
+  for (const char* colour : {"rgb", "color", "colour", "image", "images"}) add({colour}, {}, {"depth"});
   for (const auto& [left, right] : {std::pair("left", "right"), {"cam0", "cam1"}, {"l", "r"}})
-    add("", {"", left}, {"", right}, {}).pairs = true;
+    add({"", left}, {"", right}, {}).pairs = true;
   for (const char* colour : {"color", "colour", "rgb", "frame", "!depth"})
-    add("", {"", colour}, {}, {"", "depth"}).pairs = true;
-  return all;
+    add({"", colour}, {}, {"", "depth"}).pairs = true;
 }
 
 const std::vector<Layout>& Layouts() {
-  static const std::vector<Layout> layouts = MakeLayouts();
+  static const std::vector<Layout> layouts = [] {
+    std::vector<Layout> all;
+    const AddLayout add = [&all](const char* name, ImageRole left, ImageRole right, ImageRole depth,
+                                 const char* sign) -> Layout& {
+      return all.emplace_back(Layout{name, left, right, depth, sign});
+    };
+    AddPublished(add);
+    AddAnonymous(add);
+    return all;
+  }();
   return layouts;
 }
 

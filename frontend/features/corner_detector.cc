@@ -55,9 +55,7 @@ class CornerGrid {
     }
     return corners;
   }
-  std::vector<cv::KeyPoint> DetectAll(int threshold) const {
-    return Detect(cv::Rect({0, 0}, size_), threshold);
-  }
+  std::vector<cv::KeyPoint> DetectAll(int threshold) const { return Detect({{0, 0}, size_}, threshold); }
 
   void AddStrong(const std::vector<cv::KeyPoint>& corners) {
     for (const cv::KeyPoint& corner : corners) {
@@ -171,17 +169,12 @@ std::vector<cv::KeyPoint> DetectCorners(const cv::Mat& image, const CornerOption
   CornerGrid grid(image, mask, options);
   const auto wanted = static_cast<std::size_t>(std::max(0, options.wanted));
   std::vector<cv::KeyPoint> corners = grid.DetectAll(options.threshold);
+  const bool enough = corners.size() > wanted;
+  if (!enough) corners = grid.DetectAll(options.threshold_min);
   if (corners.size() > wanted) {
     grid.AddStrong(corners);
-    grid.FillEmpty();
+    enough ? grid.FillEmpty() : grid.AddWeak(corners);
     corners = grid.Strongest();
-  } else {
-    corners = grid.DetectAll(options.threshold_min);
-    if (corners.size() > wanted) {
-      grid.AddStrong(corners);
-      grid.AddWeak(corners);
-      corners = grid.Strongest();
-    }
   }
   const auto border = static_cast<float>(options.border);
   for (cv::KeyPoint& corner : corners) corner.pt += cv::Point2f(border, border);

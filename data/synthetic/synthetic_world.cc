@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/synthetic/hand.h"
 #include "data/synthetic/hills.h"
+#include "data/synthetic/moving_camera.h"
 #include "data/synthetic/scene.h"
-#include "data/synthetic/shutter.h"
 #include "data/synthetic/synthetic_random.h"
 #include "tutti/core/error.h"
 

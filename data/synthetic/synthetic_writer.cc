@@ -1,4 +1,4 @@
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 
 #include <algorithm>
 #include <atomic>
@@ -166,21 +166,27 @@ std::string CalibrationText(const SyntheticWorld& world) {
   return out;
 }
 
+std::vector<std::string> ImageFolders(SyntheticSensor sensor) {
+  switch (sensor) {
+    case SyntheticSensor::kRgbd:
+      return {"rgb", "depth"};
+    case SyntheticSensor::kStereo:
+      return {"image_0", "image_1"};
+    case SyntheticSensor::kSides:
+      return {"images"};
+    case SyntheticSensor::kMono:
+      break;
+  }
+  return {"image_0"};
+}
+
 class Writer {
  public:
   Writer(const SyntheticWorld& world, fs::path folder, const SyntheticWriteOptions& options)
       : world_(world), folder_(std::move(folder)), options_(options), sensor_(world.Options().sensor) {}
 
   std::size_t Run() {
-    if (sensor_ == SyntheticSensor::kRgbd) {
-      PrepareFolder(folder_, {"rgb", "depth"}, options_.force);
-    } else if (sensor_ == SyntheticSensor::kStereo) {
-      PrepareFolder(folder_, {"image_0", "image_1"}, options_.force);
-    } else if (sensor_ == SyntheticSensor::kSides) {
-      PrepareFolder(folder_, {"images"}, options_.force);
-    } else {
-      PrepareFolder(folder_, {"image_0"}, options_.force);
-    }
+    PrepareFolder(folder_, ImageFolders(sensor_), options_.force);
     if (sensor_ != SyntheticSensor::kSides) internal::WriteFile(folder_ / "config.yaml", ConfigText(world_));
     std::vector<std::thread> threads;
     try {

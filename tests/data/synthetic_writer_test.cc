@@ -1,4 +1,4 @@
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

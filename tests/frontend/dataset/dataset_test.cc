@@ -146,6 +146,24 @@ TEST(DatasetTest, ColourBecomesGreyAndSixteenBitIsScaled) {
   EXPECT_THAT(deep->Warnings(), ::testing::Contains(HasSubstr("12-bit")));
 }
 
+TEST(DatasetTest, SixteenBitImagesOfANarrowRangeAreStretched) {
+  const auto folder = FreshFolder();
+  for (int i = 0; i < 5; ++i) {  // a thermal camera: 7000 to 7255 of 16384
+    cv::Mat image;
+    Picture(64, 48, i).convertTo(image, CV_16U, 1, 7000);
+    WriteImage(folder / (std::to_string(i) + ".png"), image);
+  }
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  double low = 0, high = 0;
+  cv::minMaxLoc(data->Read(4).frame->image, &low, &high);
+  EXPECT_GT(high - low, 100);  // 4 without
+  EXPECT_THAT(data->Warnings(), ::testing::Contains(HasSubstr("narrow range")));
+  // One scale for all: equal temperatures stay equal.
+  WriteImage(folder / "5.png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(7128)));
+  const auto again = OpenDataset(folder, With(Sensor::kMono));
+  EXPECT_NEAR(again->Read(5).frame->image.at<unsigned char>(0, 0), 128, 4);
+}
+
 TEST(DatasetTest, TumAssociatesEachDepthImageOnceByTime) {
   const auto folder = FreshFolder();
   std::string rgb = "# timestamp filename\n", depth = "# timestamp filename\n";

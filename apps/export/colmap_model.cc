@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdio>
 #include <unordered_map>
+#include <utility>
 
-#include "apps/export/image_name.h"
-#include "apps/export/little_endian.h"
+#include "apps/export/map_files.h"
 #include "core/median.h"
 #include "core/replaced_file.h"
 
@@ -16,21 +16,120 @@ constexpr double kHalfPixel = 0.5;
 constexpr std::uint32_t kCameraId = 1;
 constexpr int kPinhole = 1;  // COLMAP's number of the model PINHOLE: fx fy cx cy
 
-// 17 digits: reading gives the same number.
-std::string Text(double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", number);
-  return text;
+// The two forms of COLMAP's files. Both have the same numbers in the same order, but counts and comments.
+class TextForm {
+ public:
+  static constexpr const char* kEnding = ".txt";
+  explicit TextForm(const std::string& comment) : text_(comment) {}
+  template <class T>
+  void Add(const T& number) {
+    text_ += std::exchange(between_, " ") + TextOf(number);
+  }
+  void Either(const char* name, int /*number*/) { text_ += std::exchange(between_, " ") + std::string(name); }
+  void AddName(const std::string& name) { text_ += " " + name; }
+  void AddCount(std::size_t /*count*/) {}
+  void EndLine() { text_ += "\n", between_ = ""; }
+  const std::string& Bytes() const { return text_; }
+
+ private:
+  // 17 digits: reading gives the same number.
+  static std::string TextOf(double number) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.17g", number);
+    return text;
+  }
+  template <class T>
+  static std::string TextOf(T number) {
+    return std::to_string(number);
+  }
+
+  std::string text_;
+  const char* between_ = "";
+};
+
+class BinaryForm {
+ public:
+  static constexpr const char* kEnding = ".bin";
+  explicit BinaryForm(const std::string& /*comment*/) {}
+  template <class T>
+  void Add(const T& number) {
+    AppendLittleEndian(number, &bytes_);
+  }
+  void Either(const char* /*name*/, int number) { Add(number); }
+  void AddName(const std::string& name) { bytes_.append(name.c_str(), name.size() + 1); }
+  void AddCount(std::size_t count) { Add(static_cast<std::uint64_t>(count)); }
+  void EndLine() {}
+  const std::string& Bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+template <class Form>
+void WriteCamerasFile(const PinholeCamera& camera, const std::filesystem::path& folder) {
+  Form out(
+      "# Camera list with one line of data per camera:\n"
+      "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
+      "# Number of cameras: 1\n");
+  out.AddCount(1);
+  out.Add(kCameraId);
+  out.Either("PINHOLE", kPinhole);
+  for (const int side : {camera.width, camera.height}) out.Add(static_cast<std::uint64_t>(side));
+  for (const double parameter : {camera.fx, camera.fy, camera.cx, camera.cy}) out.Add(parameter);
+  out.EndLine();
+  internal::WriteFile(folder / (std::string("cameras") + Form::kEnding), out.Bytes());
 }
 
-std::array<double, 7> QvecTvec(const Pose& pose) {
-  const Eigen::Quaterniond& q = pose.rotation;
-  const Eigen::Vector3d& t = pose.translation;
-  return {{q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}};
+template <class Form>
+void WriteImagesFile(const ColmapModel& model, const std::filesystem::path& folder) {
+  Form out(
+      "# Image list with two lines of data per image:\n"
+      "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
+      "#   POINTS2D[] as (X, Y, POINT3D_ID)\n"
+      "# Number of images: " +
+      std::to_string(model.Images().size()) + "\n");
+  out.AddCount(model.Images().size());
+  for (const std::size_t i : model.FileOrder()) {
+    const ColmapModel::Image& image = model.Images()[i];
+    const Eigen::Quaterniond& q = image.T_camera_world.rotation;
+    out.Add(image.id);
+    for (const double number : {q.w(), q.x(), q.y(), q.z()}) out.Add(number);
+    for (const double number : image.T_camera_world.translation) out.Add(number);
+    out.Add(kCameraId);
+    out.AddName(image.name);
+    out.EndLine();
+    out.AddCount(image.points.size());
+    for (const ColmapModel::Point2D& point : image.points) {
+      out.Add(point.pixel.x());
+      out.Add(point.pixel.y());
+      out.Add(point.point3d);
+    }
+    out.EndLine();
+  }
+  internal::WriteFile(folder / (std::string("images") + Form::kEnding), out.Bytes());
 }
 
-std::array<double, 4> Parameters(const PinholeCamera& camera) {
-  return {{camera.fx, camera.fy, camera.cx, camera.cy}};
+template <class Form>
+void WritePointsFile(const ColmapModel& model, const std::filesystem::path& folder) {
+  Form out(
+      "# 3D point list with one line of data per point:\n"
+      "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n"
+      "# Number of points: " +
+      std::to_string(model.Points().size()) + "\n");
+  out.AddCount(model.Points().size());
+  for (const ColmapModel::Point3D& point : model.Points()) {
+    out.Add(point.id);
+    for (const double coordinate : point.position) out.Add(coordinate);
+    for (const std::uint8_t channel : point.rgb) out.Add(channel);
+    out.Add(point.error_px);
+    out.AddCount(point.track.size());
+    for (const ColmapModel::TrackElement& element : point.track) {
+      out.Add(element.image);
+      out.Add(element.point);
+    }
+    out.EndLine();
+  }
+  internal::WriteFile(folder / (std::string("points3D") + Form::kEnding), out.Bytes());
 }
 
 }  // namespace
@@ -103,113 +202,13 @@ double ColmapModel::MeanTrackLength() const {
   return points_.empty() ? 0 : static_cast<double>(views) / static_cast<double>(points_.size());
 }
 
-std::string ColmapModel::CamerasText() const {
-  std::string text =
-      "# Camera list with one line of data per camera:\n"
-      "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
-      "# Number of cameras: 1\n";
-  text += std::to_string(kCameraId) + " PINHOLE " + std::to_string(camera_.width) + " " +
-          std::to_string(camera_.height);
-  for (const double parameter : Parameters(camera_)) text += " " + Text(parameter);
-  return text + "\n";
-}
-
-std::string ColmapModel::ImagesText() const {
-  std::string text =
-      "# Image list with two lines of data per image:\n"
-      "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
-      "#   POINTS2D[] as (X, Y, POINT3D_ID)\n"
-      "# Number of images: " +
-      std::to_string(images_.size()) + "\n";
-  for (const std::size_t i : file_order_) {
-    const Image& image = images_[i];
-    text += std::to_string(image.id);
-    for (const double number : QvecTvec(image.T_camera_world)) text += " " + Text(number);
-    text += " " + std::to_string(kCameraId) + " " + image.name + "\n";
-    const char* between = "";
-    for (const Point2D& point : image.points) {
-      text +=
-          between + Text(point.pixel.x()) + " " + Text(point.pixel.y()) + " " + std::to_string(point.point3d);
-      between = " ";
-    }
-    text += "\n";
-  }
-  return text;
-}
-
-std::string ColmapModel::PointsText() const {
-  std::string text =
-      "# 3D point list with one line of data per point:\n"
-      "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n"
-      "# Number of points: " +
-      std::to_string(points_.size()) + "\n";
-  for (const Point3D& point : points_) {
-    text += std::to_string(point.id);
-    for (const double coordinate : point.position) text += " " + Text(coordinate);
-    for (const int channel : point.rgb) text += " " + std::to_string(channel);
-    text += " " + Text(point.error_px);
-    for (const TrackElement& element : point.track)
-      text += " " + std::to_string(element.image) + " " + std::to_string(element.point);
-    text += "\n";
-  }
-  return text;
-}
-
-std::string ColmapModel::CamerasBinary() const {
-  std::string bytes;
-  AppendLittleEndian(std::uint64_t{1}, &bytes);
-  AppendLittleEndian(kCameraId, &bytes);
-  AppendLittleEndian(kPinhole, &bytes);
-  AppendLittleEndian(static_cast<std::uint64_t>(camera_.width), &bytes);
-  AppendLittleEndian(static_cast<std::uint64_t>(camera_.height), &bytes);
-  for (const double parameter : Parameters(camera_)) AppendLittleEndian(parameter, &bytes);
-  return bytes;
-}
-
-std::string ColmapModel::ImagesBinary() const {
-  std::string bytes;
-  AppendLittleEndian(static_cast<std::uint64_t>(images_.size()), &bytes);
-  for (const std::size_t i : file_order_) {
-    const Image& image = images_[i];
-    AppendLittleEndian(image.id, &bytes);
-    for (const double number : QvecTvec(image.T_camera_world)) AppendLittleEndian(number, &bytes);
-    AppendLittleEndian(kCameraId, &bytes);
-    bytes += image.name;
-    bytes += '\0';
-    AppendLittleEndian(static_cast<std::uint64_t>(image.points.size()), &bytes);
-    for (const Point2D& point : image.points) {
-      AppendLittleEndian(point.pixel.x(), &bytes);
-      AppendLittleEndian(point.pixel.y(), &bytes);
-      AppendLittleEndian(point.point3d, &bytes);
-    }
-  }
-  return bytes;
-}
-
-std::string ColmapModel::PointsBinary() const {
-  std::string bytes;
-  AppendLittleEndian(static_cast<std::uint64_t>(points_.size()), &bytes);
-  for (const Point3D& point : points_) {
-    AppendLittleEndian(point.id, &bytes);
-    for (const double coordinate : point.position) AppendLittleEndian(coordinate, &bytes);
-    for (const std::uint8_t channel : point.rgb) AppendLittleEndian(channel, &bytes);
-    AppendLittleEndian(point.error_px, &bytes);
-    AppendLittleEndian(static_cast<std::uint64_t>(point.track.size()), &bytes);
-    for (const TrackElement& element : point.track) {
-      AppendLittleEndian(element.image, &bytes);
-      AppendLittleEndian(element.point, &bytes);
-    }
-  }
-  return bytes;
-}
-
 void ColmapModel::Write(const std::filesystem::path& folder) const {
-  internal::WriteFile(folder / "cameras.txt", CamerasText());
-  internal::WriteFile(folder / "images.txt", ImagesText());
-  internal::WriteFile(folder / "points3D.txt", PointsText());
-  internal::WriteFile(folder / "cameras.bin", CamerasBinary());
-  internal::WriteFile(folder / "images.bin", ImagesBinary());
-  internal::WriteFile(folder / "points3D.bin", PointsBinary());
+  WriteCamerasFile<TextForm>(camera_, folder);
+  WriteImagesFile<TextForm>(*this, folder);
+  WritePointsFile<TextForm>(*this, folder);
+  WriteCamerasFile<BinaryForm>(camera_, folder);
+  WriteImagesFile<BinaryForm>(*this, folder);
+  WritePointsFile<BinaryForm>(*this, folder);
 }
 
 }  // namespace tutti

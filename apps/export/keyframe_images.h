@@ -1,4 +1,5 @@
-// The images of a map's keyframes, in colour and free of distortion, from the data set that it was made of.
+// The images of a map's keyframes, in colour and free of distortion, from the data set that it was made of;
+// and which of them an export takes.
 #pragma once
 
 #include <cstddef>
@@ -25,6 +26,9 @@ class KeyframeImages {
   ColourImage Read(const ModelKeyframe& keyframe) const;
 
  private:
+  // In the data set; nothing if it has no such frame.
+  std::optional<std::size_t> PlaceOf(const ModelKeyframe& keyframe) const;
+
   const Dataset& dataset_;
   std::int64_t offset_;                         // of its frames in the map
   std::map<std::int64_t, std::size_t> places_;  // by InputFrame::index
@@ -44,5 +48,12 @@ struct Looks {
 
 /// Reads the image of every keyframe once. Landmarks get their colours: the mean over their views.
 Looks LookAtImages(const KeyframeImages& images, MapModel* model);
+
+/// At most `most` of the keyframes that have a sharpness, as ascending indices. Where there are more, the one
+/// that is missed least goes, again and again: whose neighbours are near (along the way of the camera, in
+/// which moving and turning count alike) and which is blurred compared with those around it. First and last
+/// stay unless `most` is 1.
+std::vector<std::size_t> ChooseImages(const std::vector<ModelKeyframe>& keyframes,
+                                      const std::vector<std::optional<double>>& sharpness, std::size_t most);
 
 }  // namespace tutti

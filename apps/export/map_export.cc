@@ -9,12 +9,8 @@
 #include <system_error>
 
 #include "apps/export/colmap_model.h"
-#include "apps/export/image_choice.h"
-#include "apps/export/image_name.h"
 #include "apps/export/keyframe_images.h"
-#include "apps/export/nerf_transforms.h"
-#include "apps/export/ply_file.h"
-#include "apps/export/track_completion.h"
+#include "apps/export/map_files.h"
 #include "apps/run/output_folder.h"
 #include "core/replaced_file.h"
 #include "frontend/dataset/image_file.h"
@@ -85,8 +81,7 @@ void WriteImages(const fs::path& folder, const KeyframeImages& images, const Map
   for (const std::size_t k : chosen) {
     const ColourImage read = images.Read(model.keyframes[k]);
     if (!read.error.empty()) throw InputError(read.error);
-    const fs::path file = folder / ImageName(model.keyframes[k].frame_index);
-    WritePngFile(file, read.image);
+    WritePngFile(folder / ImageName(model.keyframes[k].frame_index), read.image);
   }
 }
 
@@ -145,11 +140,10 @@ class FolderExport {
            "colmap gui, File > Import model, " + path +
                "/sparse/0; or a trainer of Gaussian splats: train.py -s " + path});
     }
-    if (folder.transforms) {
+    if (folder.transforms)
       report->files.push_back({folder.path / kTransforms,
                                images + ", " + Count(model_.landmarks.size(), "landmark") + " in " + kPoints,
                                "ns-train splatfacto --data " + folder.path.string()});
-    }
   }
 
  private:

@@ -1,6 +1,7 @@
 #include "apps/export/map_model.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
 
 #include "apps/run/run_parts.h"
@@ -58,6 +59,12 @@ MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph, const FrameRa
     if (landmark.observations > 0) model.landmarks.push_back(landmark);
   }
   return model;
+}
+
+std::string ImageName(std::int64_t frame_index) {
+  char name[48];
+  std::snprintf(name, sizeof name, "frame_%06lld.png", static_cast<long long>(frame_index));
+  return name;
 }
 
 }  // namespace tutti

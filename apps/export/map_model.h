@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "tutti/backend/pose_graph.h"
@@ -21,7 +22,7 @@ struct ModelKeyframe {
   std::int64_t frame_index = 0;  ///< number in the map (MapSession::frame_offset)
   double stamp_s = 0;
   Pose T_world_camera;  ///< camera: x right, y down, z forward
-  /// Of MapModel::landmarks, in the order of the features; the centre of the top-left pixel is (0, 0).
+  /// They see MapModel::landmarks, in the order of the features; the centre of the top-left pixel is (0, 0).
   std::vector<SeenLandmark> views;
 };
 
@@ -51,5 +52,8 @@ struct MapModel {
 /// The model of a map. Landmarks that are gone or not finite are left out, and so are views from behind.
 /// `frames`: of the trajectory. Throws InputError if no frame has a pose.
 MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph, const FrameRange& frames = {});
+
+/// "frame_000042.png": the frame's number in its data set, so that names of exported images sort by time.
+std::string ImageName(std::int64_t frame_index);
 
 }  // namespace tutti

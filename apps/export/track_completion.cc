@@ -1,5 +1,4 @@
-#include "apps/export/track_completion.h"
-
+// Cleaner and longer tracks, for programs that have nothing but tracks.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,6 +7,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "apps/export/colmap_model.h"
 #include "core/median.h"
 
 namespace tutti {
@@ -26,7 +26,7 @@ class Pyramids {
  public:
   Pyramids(const KeyframeImages& images, const MapModel& model) : images_(images), model_(model) {}
 
-  /// Of keyframe number `k` of the model; empty if it has no image.
+  /// The pyramid of keyframe number `k` of the model; empty if it has no image.
   const std::vector<cv::Mat>& Of(std::size_t k) {
     constexpr std::size_t kKept = 40;
     Entry& entry = kept_[k];

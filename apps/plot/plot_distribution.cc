@@ -1,7 +1,7 @@
-#include "apps/plot/plot_distribution.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "apps/plot/plot.h"
 
 namespace tutti {
 namespace {
@@ -21,11 +21,7 @@ double QuantileOf(const std::vector<double>& sorted, double share) {
 }
 
 PlotShape Outline(const std::vector<Eigen::Vector2d>& points, const std::string& color, double width) {
-  PlotShape line;
-  line.points = points;
-  line.color = color;
-  line.size = width;
-  return line;
+  return {PlotShape::Kind::kLine, points, color, width};
 }
 
 void AddBox(const BoxNumbers& box, double center, double half, const std::string& color, const PlotAxes& axes,
@@ -49,7 +45,6 @@ void AddViolin(const std::vector<double>& values, double center, double half, co
   for (const Eigen::Vector2d& d : density) most = std::max(most, d.y());
   if (!(most > 0)) return;
   std::vector<Eigen::Vector2d> outline;
-  outline.reserve(2 * density.size() + 1);
   for (const Eigen::Vector2d& d : density)
     outline.push_back(axes.Page({center + half * d.y() / most, d.x()}));
   for (auto d = density.rbegin(); d != density.rend(); ++d)
@@ -126,16 +121,10 @@ std::vector<PlotShape> LayOut(const DistributionPlot& plot) {
     const std::vector<double> sorted = Finite(d.values);
     const Eigen::Vector2d below = axes.Page({center, 0});
     shapes.push_back(PlotText({below.x(), below.y() + 20}, d.name, 14, PlotShape::Anchor::kMiddle));
-    if (!sorted.empty()) {
-      const BoxNumbers box = BoxOf(sorted);
-      if (plot.violins) {
-        AddViolin(sorted, center, 0.4, d.color, axes, shapes);
-        AddBox(box, center, 0.06, d.color, axes, shapes);
-      } else {
-        AddBox(box, center, 0.25, d.color, axes, shapes);
-        AddOutliers(sorted, box, center, d.color, axes, shapes);
-      }
-    }
+    const BoxNumbers box = BoxOf(sorted);
+    if (!sorted.empty() && plot.violins) AddViolin(sorted, center, 0.4, d.color, axes, shapes);
+    if (!sorted.empty()) AddBox(box, center, plot.violins ? 0.06 : 0.25, d.color, axes, shapes);
+    if (!plot.violins) AddOutliers(sorted, box, center, d.color, axes, shapes);
     center += 1;
   }
   return shapes;

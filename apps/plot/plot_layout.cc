@@ -1,12 +1,11 @@
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
-#include "apps/plot/plot.h"
-#include "apps/plot/plot_heat.h"
-#include "apps/plot/plot_legend.h"
-#include "apps/plot/plot_picture.h"
+#include "apps/plot/plot_lines.h"
 
 namespace tutti {
 namespace {
@@ -26,34 +25,24 @@ struct View {
   }
 };
 
-struct Extent {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Vector3d high = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
-  void Add(const Eigen::Vector3d& p) {
-    if (!p.allFinite()) return;
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  bool Empty() const { return !(low.x() <= high.x()); }
-};
-
 View ChooseView(const TrajectoryPlot& plot, const PlotAxes& page) {
-  Extent all, first;
+  Eigen::AlignedBox3d all, first;
   for (const PlotSeries& series : plot.series) {
     for (const Eigen::Vector3d& p : series.points) {
-      all.Add(p);
-      if (&series == &plot.series.front()) first.Add(p);
+      if (!p.allFinite()) continue;
+      all.extend(p);
+      if (&series == &plot.series.front()) first.extend(p);
     }
   }
   View view;
-  if (all.Empty()) return view;
-  const Eigen::Vector3d size = first.Empty() ? all.high - all.low : first.high - first.low;
+  if (all.isEmpty()) return view;
+  const Eigen::Vector3d size = first.isEmpty() ? all.sizes() : first.sizes();
   std::array<int, 3> order = {0, 1, 2};
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size[a] > size[b]; });
   view.axis_x = std::min(order[0], order[1]);
   view.axis_y = std::max(order[0], order[1]);
-  view.center = 0.5 * (view.World(all.low) + view.World(all.high));
-  const Eigen::Vector2d extent = (view.World(all.high) - view.World(all.low)).cwiseMax(1e-9);
+  view.center = 0.5 * (view.World(all.min()) + view.World(all.max()));
+  const Eigen::Vector2d extent = (view.World(all.max()) - view.World(all.min())).cwiseMax(1e-9);
   view.scale = 0.94 * ((page.bottom_right - page.top_left).array() / extent.array()).minCoeff();
   return view;
 }
@@ -130,6 +119,17 @@ void AddHeat(const TrajectoryPlot& plot, const View& view, const PlotAxes& axes,
 
 }  // namespace
 
+const char* PlotPalette(std::size_t k) {
+  static constexpr const char* kColors[kPlotPaletteSize] = {"#0072b2", "#d55e00", "#009e73",
+                                                            "#cc79a7", "#e69f00", "#56b4e9"};
+  return kColors[k % kPlotPaletteSize];
+}
+
+const char* SessionColor(std::size_t k) {
+  static constexpr std::array kColors = {"#cc79a7", "#56b4e9", "#8f7d2f", "#999999", "#7a5195", "#5a9a8f"};
+  return kColors[k % kColors.size()];
+}
+
 std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
   std::vector<NamedLine> lines, others;
   bool heat = false;
@@ -189,7 +189,7 @@ std::vector<PlotShape> LayOut(const CurvePlot& plot) {
   AddAxes(axes, shapes);
   std::vector<NamedLine> lines;
   for (const PlotCurve& curve : plot.curves) {
-    lines.push_back({curve.name, {}, curve.color, curve.width, curve.dashed});
+    lines.push_back(LineOf(curve));
     for (const Eigen::Vector2d& p : curve.points) {
       if (p.allFinite()) lines.back().points.push_back(axes.Page(p));
     }

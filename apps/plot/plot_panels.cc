@@ -1,24 +1,22 @@
-#include "apps/plot/plot_panels.h"
-
 #include <algorithm>
 #include <limits>
 
-#include "apps/plot/plot_legend.h"
-#include "apps/plot/plot_picture.h"
+#include "apps/plot/plot_lines.h"
 
 namespace tutti {
 namespace {
 
 constexpr double kPanelGap = 30;  // [px]
 
-/// Low and high of one coordinate of all curves, with a little room.
-Eigen::Vector2d RangeOf(const std::vector<const PlotCurve*>& curves, int axis, double room) {
+/// Low and high of one coordinate of all curves of some panels, with a little room.
+Eigen::Vector2d RangeOf(const std::vector<PlotPanel>& panels, int axis, double room) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Eigen::Vector2d range(kInfinity, -kInfinity);
-  for (const PlotCurve* curve : curves) {
-    for (const Eigen::Vector2d& p : curve->points) {
-      if (!p.allFinite()) continue;
-      range = {std::min(range[0], p[axis]), std::max(range[1], p[axis])};
+  for (const PlotPanel& panel : panels) {
+    for (const PlotCurve& curve : panel.curves) {
+      for (const Eigen::Vector2d& p : curve.points) {
+        if (p.allFinite()) range = {std::min(range[0], p[axis]), std::max(range[1], p[axis])};
+      }
     }
   }
   if (!(range[0] <= range[1])) return {0, 1};
@@ -27,26 +25,14 @@ Eigen::Vector2d RangeOf(const std::vector<const PlotCurve*>& curves, int axis, d
   return {range[0] - margin, range[1] + margin};
 }
 
-std::vector<const PlotCurve*> CurvesOf(const PlotPanel& panel) {
-  std::vector<const PlotCurve*> out;
-  for (const PlotCurve& curve : panel.curves) out.push_back(&curve);
-  return out;
-}
-
 }  // namespace
 
 std::vector<PlotShape> LayOut(const PanelPlot& plot) {
-  std::vector<const PlotCurve*> all;
-  for (const PlotPanel& panel : plot.panels) {
-    const std::vector<const PlotCurve*> curves = CurvesOf(panel);
-    all.insert(all.end(), curves.begin(), curves.end());
-  }
-  const Eigen::Vector2d x = RangeOf(all, 0, 0);
+  const Eigen::Vector2d x = RangeOf(plot.panels, 0, 0);
   const PlotAxes page;
   std::vector<NamedLine> names;
   if (!plot.panels.empty()) {
-    for (const PlotCurve& curve : plot.panels.front().curves)
-      names.push_back({curve.name, {}, curve.color, curve.width, curve.dashed});
+    for (const PlotCurve& curve : plot.panels.front().curves) names.push_back(LineOf(curve));
   }
   const double left = page.top_left.x(), right = page.bottom_right.x();
   const double top = page.top_left.y() + LegendHeight(names, left, right),
@@ -57,7 +43,7 @@ std::vector<PlotShape> LayOut(const PanelPlot& plot) {
     PlotAxes axes;
     axes.top_left.y() = top + static_cast<double>(k) * (height + kPanelGap);
     axes.bottom_right.y() = axes.top_left.y() + height;
-    const Eigen::Vector2d y = RangeOf(CurvesOf(plot.panels[k]), 1, 0.06);
+    const Eigen::Vector2d y = RangeOf({plot.panels[k]}, 1, 0.06);
     axes.low = {x[0], y[0]};
     axes.high = {x[1], y[1]};
     axes.y_ticks = std::max(3.0, 12 / count);
@@ -66,7 +52,7 @@ std::vector<PlotShape> LayOut(const PanelPlot& plot) {
     AddAxes(axes, shapes);
     std::vector<NamedLine> lines;
     for (const PlotCurve& curve : plot.panels[k].curves) {
-      lines.push_back({curve.name, {}, curve.color, curve.width, curve.dashed});
+      lines.push_back(LineOf(curve));
       for (const Eigen::Vector2d& p : curve.points) lines.back().points.push_back(axes.Page(p));
     }
     AddLines(lines, shapes);

@@ -90,24 +90,15 @@ void Draw(cairo_t* page, const PlotShape& shape, double text_scale) {
   cairo_set_source_rgb(page, bgr[2] / 255, bgr[1] / 255, bgr[0] / 255);
   const Eigen::Vector2d& p = shape.points[0];
   cairo_new_path(page);  // a text leaves a current point
-  switch (shape.kind) {
-    case PlotShape::Kind::kLine:
-      DrawLine(page, shape);
-      break;
-    case PlotShape::Kind::kDisc:
-      cairo_arc(page, p.x(), p.y(), shape.size, 0, 2 * M_PI);
-      cairo_fill(page);
-      break;
-    case PlotShape::Kind::kBox: {
-      const Eigen::Vector2d size = shape.points[1] - p;
-      cairo_rectangle(page, p.x(), p.y(), size.x(), size.y());
-      cairo_fill(page);
-      break;
-    }
-    case PlotShape::Kind::kText:
-      DrawText(page, shape, text_scale);
-      break;
+  if (shape.kind == PlotShape::Kind::kLine) return DrawLine(page, shape);
+  if (shape.kind == PlotShape::Kind::kText) return DrawText(page, shape, text_scale);
+  if (shape.kind == PlotShape::Kind::kDisc) {
+    cairo_arc(page, p.x(), p.y(), shape.size, 0, 2 * M_PI);
+  } else {
+    const Eigen::Vector2d size = shape.points[1] - p;
+    cairo_rectangle(page, p.x(), p.y(), size.x(), size.y());
   }
+  cairo_fill(page);
 }
 
 void DrawPage(const Surface& surface, const std::vector<PlotShape>& shapes, const PlotFont& font) {
@@ -132,15 +123,8 @@ cairo_status_t Append(void* text, const unsigned char* bytes, unsigned length) {
 std::string Escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
-    if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else if (c == '&') {
-      out += "&amp;";
-    } else {
-      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
+    const char* const name = c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : nullptr;
+    out += name != nullptr ? name : std::string(1, static_cast<unsigned char>(c) < 0x20 ? ' ' : c);
   }
   return out;
 }
@@ -162,7 +146,7 @@ std::string FinishedSvg(std::string text, const std::vector<PlotShape>& shapes) 
   return text.insert(text.find('>', text.find("<svg")) + 1, Description(shapes));
 }
 
-void WritePng(const std::filesystem::path& file, const Surface& surface) {
+void WriteSurface(const std::filesystem::path& file, const Surface& surface) {
   std::string bytes;
   Check(file, cairo_surface_write_to_png_stream(surface.get(), Append, &bytes));
   internal::WriteFile(file, bytes);
@@ -215,7 +199,7 @@ void DrawShapes(const std::vector<PlotShape>& shapes, cv::Mat& picture) {
 }
 
 void WritePicture(const std::filesystem::path& file, const cv::Mat& picture) {
-  WritePng(file, CopyOf(picture));
+  WriteSurface(file, CopyOf(picture));
 }
 
 PlotFormat PlotFormatOf(const std::filesystem::path& file) {
@@ -231,7 +215,7 @@ void WritePlot(const std::filesystem::path& file, PlotFormat format, const std::
   if (format == PlotFormat::kPng) {
     const Surface surface = PixelsOf(kPlotWidth, kPlotHeight);
     DrawPage(surface, shapes, font);
-    WritePng(file, surface);
+    WriteSurface(file, surface);
     return;
   }
   std::string bytes;

@@ -20,7 +20,7 @@ struct PlotShape {
   std::string color = "#000000";        ///< #rrggbb
   double size = 1;                      ///< line width, radius or text height [px]
   bool dashed = false;
-  std::string text;
+  std::string text = {};
   enum class Anchor { kStart, kMiddle, kEnd } anchor = Anchor::kStart;
   bool vertical = false;  ///< text that reads upwards
 };

@@ -5,7 +5,7 @@
 
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/layout.h"
-#include "frontend/dataset/turned_dataset.h"
+#include "frontend/dataset/wrapped_dataset.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -68,7 +68,7 @@ ReadResult DepthBeside::Read(std::size_t i) const {
   const fs::path& file = files_.at(static_cast<std::size_t>(Number(i)));
   if (file.empty()) return result;
   cv::Mat metres;
-  result.depth_error = reader_->Read(file, rectifier_ ? &*rectifier_ : nullptr, metres);
+  result.depth_error = reader_->Read(file, rectifier_, metres);
   if (result.depth_error.empty()) result.frame->depth_m = TurnedImage(metres, options_.rotate);
   return result;
 }

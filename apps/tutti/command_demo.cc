@@ -15,7 +15,7 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/run_with_report.h"
 #include "core/terminal.h"
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {

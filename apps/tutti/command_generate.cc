@@ -15,7 +15,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "core/terminal.h"
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {

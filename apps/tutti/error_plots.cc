@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "apps/plot/plot.h"
-#include "apps/plot/plot_distribution.h"
 #include "apps/tutti/text_table.h"
 #include "apps/tutti/trajectory_plots.h"
 #include "tutti/core/error.h"

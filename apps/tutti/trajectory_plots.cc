@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "apps/plot/plot.h"
-#include "apps/plot/plot_panels.h"
 #include "core/angle.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"

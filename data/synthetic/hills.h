@@ -16,17 +16,17 @@ class Hills {
   /// `height_m`: of the highest place above the middle one [m]; 0: flat.
   explicit Hills(double height_m) : height_(height_m) {}
 
-  /// Of the ground at a place [m].
+  /// Height of the ground at a place [m].
   double HeightAt(const Eigen::Vector2d& at) const {
     return 0.5 * height_ *
            (std::sin(2 * M_PI * at.x() / kLengthX + kPhaseX) + std::sin(2 * M_PI * at.y() / kLengthY));
   }
-  /// Of the ground at a place, in a direction [rad]: positive uphill. As a car feels it, over 2.8 m.
+  /// Slope of the ground at a place, in a direction [rad], that a car feels over its 2.8 m: positive uphill.
   double SlopeAt(const Eigen::Vector2d& at, double heading) const {
     const Eigen::Vector2d half = kHalfWheelbase * Eigen::Vector2d(std::cos(heading), std::sin(heading));
     return std::atan2(HeightAt(at + half) - HeightAt(at - half), 2 * kHalfWheelbase);
   }
-  /// Of a car that stands there: the point that is so high above the ground, at right angles to it.
+  /// The point of a car that stands there that is so high above the ground, at right angles to it.
   Eigen::Vector3d PointAt(const Eigen::Vector2d& at, double above_m) const {
     const Eigen::Vector3d upwards(-std::tan(SlopeAt(at, 0)), -std::tan(SlopeAt(at, M_PI / 2)), 1);
     return Eigen::Vector3d(at.x(), at.y(), HeightAt(at)) + above_m * upwards.normalized();

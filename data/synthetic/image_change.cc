@@ -58,9 +58,8 @@ cv::Mat Dark(const cv::Mat& image, const Context& context) {
   Random random = context.OfImage();
   for (int y = 0; y < out.rows; ++y) {
     std::uint8_t* row = out.ptr(y);
-    for (int x = 0; x < out.cols * out.channels(); ++x) {
+    for (int x = 0; x < out.cols * out.channels(); ++x)
       row[x] = cv::saturate_cast<std::uint8_t>(mean[row[x]] + sigma[row[x]] * random.Normal());
-    }
   }
   return out;
 }
@@ -251,23 +250,20 @@ const std::vector<std::string>& ImageChange::Names() {
 ImageChange ImageChange::Parse(const std::string& text) {
   const std::size_t colon = text.find(':');
   const std::string name = text.substr(0, colon);
-  if (std::find(Names().begin(), Names().end(), name) == Names().end()) {
+  if (std::find(Names().begin(), Names().end(), name) == Names().end())
     throw InputError("'" + name + "': no such change of images; did you mean '" + NearestWord(name, Names()) +
                      "'?");
-  }
   if (colon == std::string::npos) return {name, 1};
   const std::string strength = text.substr(colon + 1);
-  if (strength != "1" && strength != "2") {
+  if (strength != "1" && strength != "2")
     throw InputError("'" + text + "': the strength is 1 (mild) or 2 (strong), as in " + name + ":2");
-  }
   return {name, strength == "1" ? 1 : 2};
 }
 
 cv::Mat ImageChange::Apply(const cv::Mat& image, std::uint64_t seed, int index) const {
   if (image.empty()) throw InputError("change of images: an image is empty");
-  if (image.type() != CV_8UC1 && image.type() != CV_8UC3) {
+  if (image.type() != CV_8UC1 && image.type() != CV_8UC3)
     throw InputError("change of images: an image is neither grey nor colour of 8 bits");
-  }
   const auto found = std::find_if(Operations().begin(), Operations().end(),
                                   [this](const auto& entry) { return entry.first == name_; });
   const auto number = static_cast<std::uint64_t>(found - Operations().begin());

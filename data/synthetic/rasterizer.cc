@@ -59,7 +59,7 @@ struct Target {
   double fx, fy, cx, cy;
   std::vector<float> grey, inverse_z;
 
-  // Of the ray ((x - cx) / fx, (y - cy) / fy, 1), dotted with n.
+  // The ray ((x - cx) / fx, (y - cy) / fy, 1), dotted with n.
   Linear DotRay(const Eigen::Vector3d& n) const {
     return {n.z() - n.x() * cx / fx - n.y() * cy / fy, n.x() / fx, n.y() / fy};
   }

@@ -59,9 +59,8 @@ Route::Route(std::vector<Eigen::Vector2d> points, double speed_mps, double max_y
     speed[before] = std::min(speed[before], std::sqrt(speed[j] * speed[j] + gain));
   }
   time_.assign(count + 1, 0.0);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < count; ++i)
     time_[i + 1] = time_[i] + 2 * step_ / (speed[i] + speed[(i + 1) % count]);
-  }
 }
 
 double Route::DistanceAt(double time_s) const {

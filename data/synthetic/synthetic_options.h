@@ -75,7 +75,7 @@ struct SyntheticOptions {
 
   /// Empty if usable, else what is wrong.
   std::string Validate() const;
-  /// The same with the zeros that stand for "as the scene needs it" replaced.
+  /// These options with the zeros that stand for "as the scene needs it" replaced.
   SyntheticOptions Resolved() const;
 };
 

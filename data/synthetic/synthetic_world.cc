@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/synthetic/hand.h"
 #include "data/synthetic/hills.h"
+#include "data/synthetic/moving_camera.h"
 #include "data/synthetic/scene.h"
-#include "data/synthetic/shutter.h"
 #include "data/synthetic/synthetic_random.h"
 #include "tutti/core/error.h"
 
@@ -18,9 +17,8 @@ using synthetic::Random;
 
 std::string SyntheticOptions::Validate() const {
   const bool size_given = width != 0 || height != 0;
-  if (size_given && (width < 32 || height < 32 || width > 8192 || height > 8192)) {
+  if (size_given && (width < 32 || height < 32 || width > 8192 || height > 8192))
     return "width and height must both be given, 32 to 8192 pixels";
-  }
   if (!(focal_px == 0 || (focal_px >= 1 && focal_px <= 1e5)))
     return "focal_px must be 1 to 100000 pixels, or 0";
   if (!(baseline_m >= 0 && baseline_m <= 100)) return "baseline_m must be 0 to 100 m";
@@ -412,9 +410,8 @@ SyntheticFrame SyntheticWorld::RenderFrom(std::size_t i, const Pose& T_world_cam
   const Pose pose = impl_->T_scene_first * T_world_camera;
   const synthetic::Rendering left = impl_->ViewFrom(impl_->camera, pose, Stamp(i), 0);
   cv::Mat right;
-  if (impl_->options.sensor == SyntheticSensor::kStereo) {
+  if (impl_->options.sensor == SyntheticSensor::kStereo)
     right = impl_->ViewFrom(impl_->camera, pose, Stamp(i), impl_->options.baseline_m).image;
-  }
   return impl_->Frame(i, T_world_camera, left, right);
 }
 

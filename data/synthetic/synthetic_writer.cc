@@ -1,4 +1,4 @@
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 
 #include <algorithm>
 #include <atomic>
@@ -51,7 +51,7 @@ void WriteImage(const fs::path& file, const cv::Mat& image) {
 constexpr const char* kImageFolders[] = {"image_0", "image_1", "images", "rgb", "depth"};
 constexpr const char* kWritten = "# Written by `tutti generate`";
 
-// As NumberName and StampName make it: at least six digits, or a number with six decimals.
+// NumberName and StampName make such names: at least six digits, or a number with six decimals.
 bool IsOwnName(const std::string& name) {
   constexpr const char* kDigits = "0123456789";
   const std::size_t digits = std::min(name.find_first_not_of(kDigits), name.size());
@@ -106,9 +106,8 @@ void RemoveOwn(const fs::path& folder) {
 
 void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts, bool force) {
   std::error_code code;
-  if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
+  if (fs::exists(folder, code) && !fs::is_directory(folder, code))
     throw InputError(folder.string() + ": is a file; give a folder");
-  }
   if (fs::exists(folder, code) && !fs::is_empty(folder, code)) {
     if (!force)
       throw InputError(folder.string() + ": is not empty; give another folder, or --force to write into it");
@@ -116,10 +115,9 @@ void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts
   }
   for (const std::string& part : parts) {
     fs::create_directories(folder / part, code);
-    if (code) {
+    if (code)
       throw InputError((folder / part).string() + ": can't be made (" + code.message() +
                        "); check the permissions");
-    }
   }
 }
 
@@ -143,10 +141,9 @@ std::string ConfigText(const SyntheticWorld& world) {
                    : "mono")
       << "\n"
       << "  rate_hz: " << o.rate_hz << "  # frames per second\n";
-  if (rgbd) {
+  if (rgbd)
     out << "  depth_units_per_m: " << o.depth_units_per_m << "  # value in the depth image of one metre\n"
         << "  max_depth_m: " << o.max_depth_m << "  # nothing is measured beyond [m]\n";
-  }
   out << "camera:\n  width: " << c.width << "  # [px]\n  height: " << c.height << "\n  fx: " << c.fx
       << "  # [px]\n  fy: " << c.fy << "\n  cx: " << c.cx << "\n  cy: " << c.cy << "\n  distortion: none\n";
   if (stereo)
@@ -169,21 +166,27 @@ std::string CalibrationText(const SyntheticWorld& world) {
   return out;
 }
 
+std::vector<std::string> ImageFolders(SyntheticSensor sensor) {
+  switch (sensor) {
+    case SyntheticSensor::kRgbd:
+      return {"rgb", "depth"};
+    case SyntheticSensor::kStereo:
+      return {"image_0", "image_1"};
+    case SyntheticSensor::kSides:
+      return {"images"};
+    case SyntheticSensor::kMono:
+      break;
+  }
+  return {"image_0"};
+}
+
 class Writer {
  public:
   Writer(const SyntheticWorld& world, fs::path folder, const SyntheticWriteOptions& options)
       : world_(world), folder_(std::move(folder)), options_(options), sensor_(world.Options().sensor) {}
 
   std::size_t Run() {
-    if (sensor_ == SyntheticSensor::kRgbd) {
-      PrepareFolder(folder_, {"rgb", "depth"}, options_.force);
-    } else if (sensor_ == SyntheticSensor::kStereo) {
-      PrepareFolder(folder_, {"image_0", "image_1"}, options_.force);
-    } else if (sensor_ == SyntheticSensor::kSides) {
-      PrepareFolder(folder_, {"images"}, options_.force);
-    } else {
-      PrepareFolder(folder_, {"image_0"}, options_.force);
-    }
+    PrepareFolder(folder_, ImageFolders(sensor_), options_.force);
     if (sensor_ != SyntheticSensor::kSides) internal::WriteFile(folder_ / "config.yaml", ConfigText(world_));
     std::vector<std::thread> threads;
     try {
@@ -244,9 +247,8 @@ class Writer {
     if (sensor_ == SyntheticSensor::kRgbd) {
       for (const char* part : {"rgb", "depth"}) {
         std::string list = "# timestamp filename\n";
-        for (const StampedPose& p : truth) {
+        for (const StampedPose& p : truth)
           list += Fixed(p.stamp_s) + " " + part + "/" + StampName(p.stamp_s) + "\n";
-        }
         internal::WriteFile(folder_ / (std::string(part) + ".txt"), list);
       }
       WriteTrajectory(folder_ / "groundtruth.txt", truth, TrajectoryFormat::kTum);

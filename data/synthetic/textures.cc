@@ -278,9 +278,8 @@ cv::Mat BusTexture(std::uint64_t seed) {
   const bool windows = random.Unit() < 0.6;
   if (windows) {
     const int pitch = random.Int(58, 96), top = random.Int(20, 40), height = random.Int(60, 90);
-    for (int x = 10; x + pitch - 8 < kWidth; x += pitch) {
+    for (int x = 10; x + pitch - 8 < kWidth; x += pitch)
       Window(image, {x + 4, top, pitch - 14, height}, random.In(20, 50), 1, random);
-    }
   } else {  // planks of a lorry
     for (int x = 0; x < kWidth; x += 32) Box(image, x, 12, 2, 190, random.In(40, 120));
   }

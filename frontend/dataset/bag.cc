@@ -1,14 +1,12 @@
 #include "frontend/dataset/bag.h"
 
+#include <zstd.h>
+
 #include <algorithm>
 #include <fstream>
-#include <string_view>
 #include <tuple>
 
-#include "frontend/dataset/mcap_bag.h"
-#include "frontend/dataset/ros_bag.h"
-#include "frontend/dataset/sqlite_bag.h"
-#include "frontend/dataset/unpacker.h"
+#include "frontend/dataset/chunked_bag.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -30,10 +28,10 @@ std::unique_ptr<Bag> OpenBagFile(const fs::path& file) {
   in.read(magic.data(), static_cast<std::streamsize>(magic.size()));
   magic.resize(static_cast<std::size_t>(in.gcount()));
   const auto begins_with = [&](std::string_view text) { return magic.compare(0, text.size(), text) == 0; };
-  if (begins_with(RosBag::kMagic)) return std::make_unique<RosBag>(file);
-  if (begins_with(McapBag::kMagic)) return std::make_unique<McapBag>(file);
-  if (begins_with("SQLite format 3")) return std::make_unique<SqliteBag>(file);
-  if (begins_with("\x28\xb5\x2f\xfd")) throw InputError(no_bag + "it is packed; unpack it: zstd -d");
+  if (begins_with(kRosBagMagic)) return OpenRosBag(file);
+  if (begins_with(kMcapMagic)) return OpenMcapBag(file);
+  if (begins_with("SQLite format 3")) return OpenSqliteBag(file);
+  if (IsPacked(magic)) throw InputError(no_bag + "it is packed; unpack it: zstd -d");
   throw InputError(
       no_bag +
       "it begins neither with '#ROSBAG V2.0' (ROS 1) nor as MCAP or SQLite (ROS 2: the files that "
@@ -120,7 +118,10 @@ std::vector<BagMessage> Bag::Messages(const std::string& topic) const {
 std::string Bag::Read(const BagMessage& message) const {
   std::string bytes = ReadStored(message);
   if (!IsPacked(bytes)) return bytes;
-  std::optional<std::string> unpacked = UnpackedFrame(bytes, kMostMessageBytes);
+  // Its numbers for errors, and for sizes that a frame does not say, are beyond any size.
+  const unsigned long long size = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
+  std::optional<std::string> unpacked;
+  if (size <= kMostMessageBytes) unpacked = Unpacked(Packing::kZstd, bytes, size);
   if (!unpacked) throw InputError("a message can't be unpacked: it is damaged");
   return *std::move(unpacked);
 }
@@ -135,10 +136,9 @@ std::size_t Bag::Lost(const std::string& topic) const {
 }
 
 void Bag::AddMessage(const BagMessage& message) {
-  if (messages_.size() == kMostBagMessages) {
+  if (messages_.size() == kMostBagMessages)
     throw InputError(file_.string() + ": has more than " + std::to_string(kMostBagMessages / 1'000'000) +
                      " million messages; take the images out with 'rosbag filter' or 'ros2 bag convert'");
-  }
   messages_.push_back(message);
 }
 

@@ -6,12 +6,16 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "frontend/dataset/ros_message.h"
 
 namespace tutti {
+
+constexpr std::string_view kRosBagMagic = "#ROSBAG V2.0\n",
+                           kMcapMagic = "\x89MCAP0\r\n";  ///< beginnings of files
 
 constexpr std::uint32_t kMostMessageBytes = 1U << 29U;  ///< and those of an unpacked chunk: 537 MB
 
@@ -22,9 +26,8 @@ struct BagMessage {
   std::uint64_t begin = 0;  ///< in the unpacked chunk, or in the file; of a database: its row
   std::int32_t chunk = -1;  ///< that is compressed; -1: none
   std::uint32_t part = 0;   ///< of a recording in several files
-  /// Of its header, for messages that begin with one (std_msgs/Header); nan where the message is compressed.
-  double stamp_s = 0;
-  double received_s = 0;  ///< when the recorder got it
+  double stamp_s = 0;       ///< in its header (std_msgs/Header); nan where the message is compressed
+  double received_s = 0;    ///< when the recorder got it
 };
 
 /// The messages of a recording. Indices in it are not needed: one that was cut off while recording gives what
@@ -88,5 +91,11 @@ class Bag {
   std::vector<Topic> topics_;
   std::string damage_;
 };
+
+/// Files of one format, which begin with its magic. Throw InputError where the file can't be opened, is
+/// encrypted, or has not the tables of 'ros2 bag record'.
+std::unique_ptr<Bag> OpenRosBag(const std::filesystem::path& file);
+std::unique_ptr<Bag> OpenMcapBag(const std::filesystem::path& file);
+std::unique_ptr<Bag> OpenSqliteBag(const std::filesystem::path& file);
 
 }  // namespace tutti

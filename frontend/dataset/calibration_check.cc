@@ -32,24 +32,21 @@ void CheckLens(const PinholeCamera& c, const CalibrationCheckOptions& options, C
   const bool wide = c.width >= c.height;
   report.view_deg = 2 * internal::kDegrees * std::atan(wide ? 0.5 * c.width / c.fx : 0.5 * c.height / c.fy);
   report.centre_offset = std::max(std::abs(c.cx / c.width - 0.5), std::abs(c.cy / c.height - 0.5));
-  if (report.view_deg < options.min_view_deg || report.view_deg > options.max_view_deg) {
+  if (report.view_deg < options.min_view_deg || report.view_deg > options.max_view_deg)
     report.findings.push_back(
         {Text("a focal length of %.1f px in an image of %dx%d is a field of view of %.0f deg", c.fx, c.width,
               c.height, report.view_deg),
          "give fx and fy in pixels (not mm), of this very image size"});
-  }
   const double aspect = std::max(c.fx / c.fy, c.fy / c.fx);
-  if (aspect > options.max_aspect) {
+  if (aspect > options.max_aspect)
     report.findings.push_back({Text("fx = %.1f and fy = %.1f differ by a factor of %.2f", c.fx, c.fy, aspect),
                                "check fx and fy; pixels of cameras are almost square"});
-  }
-  if (report.centre_offset > options.max_centre_offset) {
+  if (report.centre_offset > options.max_centre_offset)
     report.findings.push_back(
         {Text("the principal point (%.1f, %.1f) lies %.0f %% of the image's side from its middle", c.cx, c.cy,
               100 * report.centre_offset),
          Text("is the calibration of another image size than %dx%d? fx, fy, cx, cy scale with the image",
               c.width, c.height)});
-  }
 }
 
 struct StereoMatches {

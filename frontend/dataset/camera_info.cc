@@ -6,12 +6,12 @@
 #include <algorithm>
 
 #include "core/camera_text.h"
+#include "frontend/dataset/image_file.h"
+#include "frontend/dataset/rectified_rig.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
-
-std::string Size(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
 
 Eigen::Matrix3d Rotation(const std::array<double, 9>& rows) {
   Eigen::Matrix3d R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
@@ -30,9 +30,9 @@ bool ImageWindow::IsWhole() const {
 std::string ImageWindow::Text() const {
   std::string text;
   if (binning_x > 1 || binning_y > 1)
-    text = "binning " + Size(std::max(1, binning_x), std::max(1, binning_y));
+    text = "binning " + SizeText({std::max(1, binning_x), std::max(1, binning_y)});
   if (width > 0 && height > 0)
-    text += (text.empty() ? "region " : ", region ") + Size(width, height) + " at (" +
+    text += (text.empty() ? "region " : ", region ") + SizeText({width, height}) + " at (" +
             std::to_string(x_offset) + ", " + std::to_string(y_offset) + ")";
   return text;
 }
@@ -49,7 +49,7 @@ PinholeCamera Windowed(PinholeCamera camera, const ImageWindow& window, const st
       outside(window.y_offset, region ? window.height : 0, camera.height) ||
       (sized && (bin_x > camera.width || bin_y > camera.height)))
     throw InputError(source + ": the part of the image (" + window.Text() + ") does not lie in the " +
-                     Size(camera.width, camera.height) +
+                     SizeText({camera.width, camera.height}) +
                      " pixels of the calibration; width and height are those of whole, unbinned images "
                      "(REP 104)");
   camera.width = (region ? window.width : camera.width) / bin_x;
@@ -62,28 +62,13 @@ PinholeCamera Windowed(PinholeCamera camera, const ImageWindow& window, const st
 }
 
 PinholeCamera CameraInfo::Raw(const std::string& source) const {
-  PinholeCamera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = K[0];
-  camera.cx = K[2];
-  camera.fy = K[4];
-  camera.cy = K[5];
+  PinholeCamera camera = Pinhole(K[0], K[4], K[2], K[5], {width, height});
   const std::string wrong = internal::SetLens(model, lens, camera);
   if (!wrong.empty()) throw InputError(source + ": " + wrong);
   return camera;
 }
 
-PinholeCamera CameraInfo::Rectified() const {
-  PinholeCamera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = P[0];
-  camera.cx = P[2];
-  camera.fy = P[5];
-  camera.cy = P[6];
-  return camera;
-}
+PinholeCamera CameraInfo::Rectified() const { return Pinhole(P[0], P[5], P[2], P[6], {width, height}); }
 
 Pose TransformOfRectified(const std::array<double, 9>& R_left, const std::array<double, 9>& R_right,
                           double baseline_m) {

@@ -37,7 +37,7 @@ struct CameraInfo {
   ImageWindow window;
 
   bool IsCalibrated() const { return K[0] > 0; }
-  /// Of raw images; throws InputError, which begins with `source`, for a lens that tutti has not.
+  /// The camera of raw images; throws InputError, which begins with `source`, for a lens that tutti has not.
   PinholeCamera Raw(const std::string& source) const;
   PinholeCamera Rectified() const;
 };

@@ -43,14 +43,13 @@ void CameraInput::OpenDevice(const std::string& name, const DeviceMode& mode) {
     opened = capture_.open(number, cv::CAP_V4L2);
   } catch (const cv::Exception&) {  // no such camera, or OpenCV was built without V4L2
   }
-  if (!opened) {
+  if (!opened)
     throw InputError(name + ": there is no such camera (" + source_ +
                      "), or no permission to use it; is it plugged in, and are you in the group video?" +
                      (content_ == CameraContent::kDepth
                           ? " Of depth devices OpenCV opens those with the format Y16 (v4l2-ctl "
                             "--list-formats), not those with Z16 alone"
                           : ""));
-  }
   if (content_ == CameraContent::kDepth)
     capture_.set(cv::CAP_PROP_FOURCC, cv::VideoWriter::fourcc('Y', '1', '6', ' '));
   if (mode.width > 0) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -14,18 +15,23 @@
 
 namespace tutti {
 
-/// Bytes that are looked at here and there: those of a file, or of an unpacked chunk.
-class ByteSource {
- public:
-  virtual ~ByteSource() = default;
-  /// False: they are not all there.
-  virtual bool Read(std::uint64_t at, std::size_t size, char* out) const = 0;
-};
+enum class Packing { kNone, kLz4, kBz2, kZstd, kUnknown };
+
+/// The bytes that LZ4 (a frame, lz4frame.h), bzip2 or Zstandard packed, which must be `size`. They grow as
+/// they come, so that a chunk that lies about its size costs no memory. Nothing: the bytes are damaged, or do
+/// not become that many.
+std::optional<std::string> Unpacked(Packing packing, std::string_view packed, std::uint64_t size);
+
+/// Copies bytes from a place on, of a file or of an unpacked chunk. False: they are not all there.
+using ByteSource = std::function<bool(std::uint64_t at, std::size_t size, char* out)>;
+template <typename T>
+bool ReadValue(const ByteSource& bytes, std::uint64_t at, T* value) {
+  return bytes(at, sizeof *value, reinterpret_cast<char*>(value));
+}
 
 /// Memory, beside that of Bag: one chunk.
 class ChunkedBag : public Bag {
  protected:
-  enum class Packing { kNone, kLz4, kBz2, kZstd, kUnknown };
   struct Chunk {
     std::uint64_t begin = 0, size = 0;  // in the file
     std::uint64_t unpacked_size = 0;
@@ -60,35 +66,17 @@ class ChunkedBag : public Bag {
   bool Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk);
   void WalkPacked(const Chunk& chunk);
   void NoteNoRecord(std::uint64_t at, std::int32_t chunk);
-  class FileBytes : public ByteSource {
-   public:
-    explicit FileBytes(std::ifstream* in) : in_(in) {}
-    bool Read(std::uint64_t at, std::size_t size, char* out) const override;
-
-   private:
-    std::ifstream* in_;
-  };
-
   std::string ReadStored(const BagMessage& message) const override;
-  std::string Unpack(std::size_t chunk) const;
+  void Unpack(std::int32_t number) const;
 
   std::uint64_t file_size_ = 0;
   std::vector<Chunk> chunks_;  // compressed ones
   mutable std::mutex mutex_;
   mutable std::ifstream in_;
-  FileBytes bytes_;
+  const ByteSource bytes_;  // of the file
   bool chunk_lost_ = false;
   mutable std::int32_t unpacked_ = -1;  // whose bytes these are
   mutable std::string unpacked_bytes_;
-};
-
-class MemoryBytes : public ByteSource {
- public:
-  explicit MemoryBytes(std::string_view bytes) : bytes_(bytes) {}
-  bool Read(std::uint64_t at, std::size_t size, char* out) const override;
-
- private:
-  std::string_view bytes_;
 };
 
 }  // namespace tutti

@@ -6,12 +6,39 @@
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/rectified_rig.h"
-#include "frontend/dataset/selected_dataset.h"
-#include "frontend/dataset/turned_dataset.h"
+#include "frontend/dataset/wrapped_dataset.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
 namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<DatasetType> DetectedType(const fs::path& path) {
+  try {
+    return DetectDatasetType(path);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+// The data sets in the folders of this one, for somebody who gave the folder above.
+std::string DataSetsInside(const fs::path& folder) {
+  std::error_code code;
+  std::vector<std::string> names;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    if (it->is_directory(code) && DetectedType(it->path())) names.push_back(it->path().filename().string());
+  }
+  if (names.empty()) return {};
+  std::sort(names.begin(), names.end(), NaturalLess);
+  constexpr std::size_t kNamed = 5;
+  const std::string more = names.size() > kNamed ? ", ..." : "";
+  names.resize(std::min(kNamed, names.size()));
+  return ". There are data sets in it: give one of " + JoinText(names) + more;
+}
+
+}  // namespace
 
 EnumWords<DatasetType> WordsOf(DatasetType /*of*/) {
   return {{"auto", DatasetType::kAuto},   {"kitti", DatasetType::kKitti},   {"tum", DatasetType::kTum},
@@ -29,11 +56,10 @@ std::optional<Pose> RigidTransform(const TransformRows& rows) {
   const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
   const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 0.01 &&
                         R.determinant() > 0;  // false if anything is not finite
-  if (!rotation || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  if (!rotation || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
     throw InputError(
         "is not a rigid transform: 4 rows are needed, a rotation with the translation [m] behind it, and "
         "0, 0, 0, 1");
-  }
   return Pose::FromMatrix(matrix.topRows<3>());
 }
 
@@ -60,7 +86,7 @@ DatasetOptions ForAnotherRecording(DatasetOptions options) {
   std::error_code ignored;
   options.start = options.end = 0;
   options.stride = 1;
-  if (std::filesystem::is_directory(options.mask, ignored)) options.mask.clear();
+  if (fs::is_directory(options.mask, ignored)) options.mask.clear();
   return options;
 }
 
@@ -86,20 +112,19 @@ std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s) {
   return low;
 }
 
-FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options) {
-  if (options.sensor != Sensor::kMono) {
+FolderContents FindImages(const fs::path& folder, const DatasetOptions& options) {
+  if (options.sensor != Sensor::kMono)
     throw InputError(folder.string() +
                      ": a plain folder of images is mono; for stereo use the KITTI or EuRoC layout, for "
                      "RGB-D the TUM layout (data/README.md shows them)");
-  }
   FolderContents out;
   out.folder = folder;
-  out.left = options.camera;
+  out.rig.left = options.camera;
   out.rate_hz = options.rate_hz > 0 ? options.rate_hz : 10.0;
-  const std::vector<std::filesystem::path> files = FramesIn(folder, false, &out.warnings);
+  const std::vector<fs::path> files = FramesIn(folder, false, &out.warnings);
   if (files.empty()) throw InputError(folder.string() + ": holds no images (png, jpg, webp, ...)");
   const internal::StampsOfNames named = StampsInNames(files);
-  // Of a folder that grows, the unit must show in the first names.
+  // In a folder that grows, the first names must show the unit.
   constexpr double kSince1970_s = 5e8;
   const bool has_stamps = named.stamps.size() == files.size() &&
                           (options.follow_s == 0 || named.stamps.front().first >= kSince1970_s);
@@ -107,80 +132,49 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
     FrameFiles frame;
     frame.stamp_s = has_stamps ? named.stamps[i].first : static_cast<double>(i) / out.rate_hz;
     frame.image = files[has_stamps ? named.stamps[i].second : i];
-    out.pose_stamps.emplace_back(i, frame.stamp_s);
     out.frames.push_back(std::move(frame));
   }
   if (has_stamps) {
     out.stamp_unit = named.unit;
-    if (files.size() > 1)
-      out.rate_hz =
-          static_cast<double>(files.size() - 1) / (out.frames.back().stamp_s - out.frames.front().stamp_s);
+    out.MeasureRate();
     out.warnings.push_back(folder.string() +
                            ": the images have the time stamps that they are called by, in " +
                            internal::NameOf(named.unit));
   }
-  out.pose_count = files.size();
-  if (!out.left) out.warnings.push_back(NoCalibrationText(folder.string()));
+  if (!out.rig.left) out.warnings.push_back(NoCalibrationText(folder.string()));
   out.truth_places = {folder / "groundtruth.txt", folder / "poses.txt"};
   return out;
 }
 
-namespace {
-
-// The data sets in the folders of this one, for somebody who gave the folder above.
-std::string DataSetsInside(const std::filesystem::path& folder) {
-  std::error_code code;
-  std::vector<std::string> names;
-  for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    if (!it->is_directory(code)) continue;
-    try {
-      DetectDatasetType(it->path());
-      names.push_back(it->path().filename().string());
-    } catch (const InputError&) {
-      continue;  // none
-    }
-  }
-  if (names.empty()) return {};
-  std::sort(names.begin(), names.end(), NaturalLess);
-  constexpr std::size_t kNamed = 5;
-  const std::string more = names.size() > kNamed ? ", ..." : "";
-  names.resize(std::min(kNamed, names.size()));
-  return ". There are data sets in it: give one of " + JoinText(names) + more;
-}
-
-}  // namespace
-
-DatasetType DetectDatasetType(const std::filesystem::path& path) {
+DatasetType DetectDatasetType(const fs::path& path) {
   if (IsCamera(path.string()))
     throw InputError(path.string() +
                      ": gives its frames once, in order, and all of them are needed here; save them as a "
                      "video file, and give that");
   std::error_code code;
-  if (!std::filesystem::exists(path, code)) {
+  if (!fs::exists(path, code))
     throw InputError(path.string() +
                      ": does not exist; give the folder of a data set, a folder of images, or a video file");
-  }
-  if (!std::filesystem::is_directory(path, code)) {
+  if (!fs::is_directory(path, code)) {
     if (HasImageExtension(path))
       throw InputError(path.string() + ": is a single image; give the folder that holds it");
     const std::string type = path.extension().string();
     const auto bags = {".bag", ".mcap", ".db3", ".zstd"};  // the last one: packed, which Bag::Open says
     return std::find(bags.begin(), bags.end(), type) != bags.end() ? DatasetType::kBag : DatasetType::kVideo;
   }
-  const auto folder = [&](const char* name) { return std::filesystem::is_directory(path / name, code); };
-  const auto file = [&](const char* name) { return std::filesystem::is_regular_file(path / name, code); };
+  const auto folder = [&](const char* name) { return fs::is_directory(path / name, code); };
+  const auto file = [&](const char* name) { return fs::is_regular_file(path / name, code); };
   if (folder("mav0/cam0") || file("cam0/sensor.yaml")) return DatasetType::kEuroc;
   if (folder("image_0") || folder("image_2")) return DatasetType::kKitti;
   if (file("rgb.txt") || file("associations.txt") || file("color.txt")) return DatasetType::kTum;
   if (IsStrayScanner(path) || FindLayout(path)) return DatasetType::kPaired;
   if (!ListImages(path).empty()) return DatasetType::kImages;
   if (!Bag::Files(path).empty()) return DatasetType::kBag;
-  const std::filesystem::directory_iterator entries(path, code);
+  const fs::directory_iterator entries(path, code);
   if (code)
     throw InputError(path.string() + ": can't be listed (" + code.message() + "); check its permissions");
   throw InputError(
-      path.string() +
-      (entries == std::filesystem::directory_iterator() ? ": is empty" : ": holds no data set") +
+      path.string() + (entries == fs::directory_iterator() ? ": is empty" : ": holds no data set") +
       "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), another layout of data/README.md, "
       "images, or bags of ROS 2" +
       DataSetsInside(path));
@@ -188,41 +182,26 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
 
 namespace {
 
-bool IsLayout(DatasetType type) {
-  return type == DatasetType::kKitti || type == DatasetType::kTum || type == DatasetType::kEuroc ||
-         type == DatasetType::kPaired;
-}
-
-// Nothing where none is seen.
-std::optional<DatasetType> DetectedType(const std::filesystem::path& path) {
-  try {
-    return DetectDatasetType(path);
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
-}
-
 // What is opened for a path and a type.
 struct Place {
-  std::filesystem::path path;
+  fs::path path;
   DatasetType type = DatasetType::kAuto;
   std::string note;  // empty: what was given
 };
 
 // A configuration says the layout, and the path is the folder of images inside it: the data set that it is
 // part of; else its images alone, if that is enough. Nothing if neither is so.
-std::optional<Place> Around(const std::filesystem::path& path, const DatasetOptions& options) {
+std::optional<Place> Around(const fs::path& path, const DatasetOptions& options) {
   std::error_code code;
-  const std::filesystem::path given =
-      (std::filesystem::absolute(path, code).lexically_normal() / "").parent_path();
-  std::filesystem::path folder = given;
+  const fs::path given = (fs::absolute(path, code).lexically_normal() / "").parent_path();
+  fs::path folder = given;
   for (int level = 0; level < 3 && folder.has_relative_path(); ++level) {
     folder = folder.parent_path();
     if (DetectedType(folder) != options.type) continue;
-    const std::optional<std::filesystem::path> images = ImagesOfDataset(folder);
+    const std::optional<fs::path> images = ImagesOfDataset(folder);
     // mav0/cam0 for mav0/cam0/data
-    if (images && (std::filesystem::equivalent(*images, given, code) ||
-                   std::filesystem::equivalent(images->parent_path(), given, code)))
+    if (images &&
+        (fs::equivalent(*images, given, code) || fs::equivalent(images->parent_path(), given, code)))
       return Place{folder, options.type,
                    path.string() + ": is part of " + folder.string() + ", which is read"};
     throw InputError(path.string() + ": is part of " + folder.string() +
@@ -235,57 +214,42 @@ std::optional<Place> Around(const std::filesystem::path& path, const DatasetOpti
       path.string() + ": is not in the layout of the configuration; its images are read as a plain folder"};
 }
 
-Place PlaceToOpen(const std::filesystem::path& path, const DatasetOptions& options) {
-  if (IsLayout(options.type)) {
-    const std::optional<DatasetType> seen = DetectedType(path);
-    if (!seen || seen == DatasetType::kImages) {
-      std::error_code code;
-      if (std::filesystem::is_directory(path, code)) {
-        if (std::optional<Place> around = Around(path, options)) return *around;
-      }
-    }
+Place PlaceToOpen(const fs::path& path, const DatasetOptions& options) {
+  std::error_code code;
+  const bool folder = fs::is_directory(path, code);
+  const bool layout = options.type == DatasetType::kKitti || options.type == DatasetType::kTum ||
+                      options.type == DatasetType::kEuroc || options.type == DatasetType::kPaired;
+  if (layout && folder && DetectedType(path).value_or(DatasetType::kImages) == DatasetType::kImages) {
+    if (std::optional<Place> around = Around(path, options)) return *around;
   }
   const DatasetType seen = DetectDatasetType(path);  // missing or empty: the same words for every type
   const DatasetType type = options.type == DatasetType::kAuto ? seen : options.type;
   const auto is_file = [](DatasetType t) { return t == DatasetType::kVideo || t == DatasetType::kBag; };
-  std::error_code code;
-  const bool folder = std::filesystem::is_directory(path, code);
-  if (is_file(type) != is_file(seen) || (folder && type == DatasetType::kVideo)) {
+  if (is_file(type) != is_file(seen) || (folder && type == DatasetType::kVideo))
     throw InputError(path.string() + (is_file(type)
                                           ? ": is a folder, but the type is video or bag; give the file"
                                       : folder ? ": holds bags of ROS 2; let dataset.type be auto, or bag"
                                                : ": is a file; give the folder of the data set"));
-  }
   return {path, type, {}};
 }
 
-FolderContents FindPlace(const Place& place, const DatasetOptions& options) {
-  switch (place.type) {
-    case DatasetType::kKitti:
-      return FindKitti(place.path, options);
-    case DatasetType::kTum:
-      return FindTum(place.path, options);
-    case DatasetType::kEuroc:
-      return FindEuroc(place.path, options);
-    case DatasetType::kPaired:
-      return FindPaired(place.path, options);
-    default:
-      return FindImages(place.path, options);
-  }
-}
-
-FolderContents FindFrames(const std::filesystem::path& path, const DatasetOptions& options) {
+FolderContents FindFrames(const fs::path& path, const DatasetOptions& options) {
   const Place place = PlaceToOpen(path, options);
-  FolderContents contents = FindPlace(place, options);
+  const auto find = place.type == DatasetType::kKitti    ? FindKitti
+                    : place.type == DatasetType::kTum    ? FindTum
+                    : place.type == DatasetType::kEuroc  ? FindEuroc
+                    : place.type == DatasetType::kPaired ? FindPaired
+                                                         : FindImages;
+  FolderContents contents = find(place.path, options);
   if (!place.note.empty()) contents.warnings.push_back(place.note);
   return contents;
 }
 
-std::unique_ptr<Dataset> OpenWhole(const std::filesystem::path& path, const DatasetOptions& use) {
+std::unique_ptr<Dataset> OpenWhole(const fs::path& path, const DatasetOptions& use) {
   if (IsCamera(path.string())) return OpenCamera(path.string(), use);
   std::error_code code;
   if (use.follow_s > 0) {
-    if (!std::filesystem::is_directory(path, code))
+    if (!fs::is_directory(path, code))
       throw InputError(path.string() + ": is no folder; only a folder of images can be followed");
     return FollowFolder([path, use] { return FindFrames(path, use); }, use);
   }
@@ -298,11 +262,11 @@ std::unique_ptr<Dataset> OpenWhole(const std::filesystem::path& path, const Data
 
 }  // namespace
 
-DatasetType TypeToOpen(const std::filesystem::path& path, const DatasetOptions& options) {
+DatasetType TypeToOpen(const fs::path& path, const DatasetOptions& options) {
   return PlaceToOpen(path, options).type;
 }
 
-std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
+std::unique_ptr<Dataset> OpenDataset(const fs::path& path, const DatasetOptions& options) {
   const std::string problem = options.Validate();
   if (!problem.empty()) throw InputError("dataset: " + problem);
   if (options.rotate % 90 != 0)
@@ -313,7 +277,7 @@ std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const Da
     use.mirrored_ground_truth = true;
   }
   std::unique_ptr<Dataset> whole = OpenWhole(path, use);
-  if (use.rotate != 0) whole = std::make_unique<TurnedDataset>(std::move(whole), use.rotate, path.string());
+  if (use.rotate != 0) whole = TurnFrames(std::move(whole), use.rotate, path.string());
   return SelectFrames(std::move(whole), use, path.string());
 }
 

@@ -1,17 +1,14 @@
 // Bags of ROS with sensor_msgs/Image, CompressedImage and CameraInfo.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <limits>
-#include <string>
-#include <utility>
 
 #include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/ros_message.h"
-#include "frontend/dataset/video_input.h"
+#include "frontend/dataset/video_decoder.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -24,32 +21,26 @@ constexpr double kRosUnits = 1000;  // of 16-bit depth: millimetres (REP 118)
 
 using Messages = std::vector<BagMessage>;
 
-class BagDataset : public Dataset {
+class BagDataset : public RecordedDataset {
  public:
   BagDataset(const fs::path& file, const DatasetOptions& options)
-      : file_(file), options_(options), bag_(Bag::Open(file)) {
+      : RecordedDataset(file.string(), options), bag_(Bag::Open(file)) {
     FindTopics();
     Index();
     if (!bag_->damage().empty()) warnings_.push_back(bag_->damage());
-    SetUpRig();
+    FindRig();
   }
 
   std::size_t Size() const override { return frames_.size(); }
   double Stamp(std::size_t i) const override { return frames_.at(i).image->stamp_s; }
   double SkippedShare() const override { return skipped_share_; }
-  const CameraRig& Rig() const override { return rig_.rig; }
-  std::optional<fs::path> GroundTruthFile() const override { return std::nullopt; }
-  const std::vector<std::string>& Warnings() const override { return warnings_; }
-  Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
-    return ReadTrajectory(file, GuessTrajectoryFormat(file), warnings);
-  }
 
   ColourImage ReadColour(std::size_t i) const override {
     ColourImage result;
     try {
       result.image = ToColour(ReadPixels(*frames_.at(i).image, options_.topic, Pixels::kColour, rig_.left));
     } catch (const std::exception& e) {
-      result.error = About(i) + e.what();
+      result.error = About(i) + ": " + e.what();
     }
     return result;
   }
@@ -63,34 +54,33 @@ class BagDataset : public Dataset {
       frame.stamp_s = at.image->stamp_s;
       frame.image = ReadPixels(*at.image, options_.topic, Pixels::kGrey, rig_.left);
       frame.mask = mask_;
-      result.depth_error = AddDepth(at, i, &frame);
+      result.depth_error = AddOther(at, i, &frame);
       result.frame = std::move(frame);
     } catch (const std::exception& e) {
-      result.error = About(i) + e.what();
+      result.error = About(i) + ": " + e.what();
     }
     return result;
   }
 
  private:
   struct Frame {
-    const BagMessage *image = nullptr, *right = nullptr, *depth = nullptr;
+    const BagMessage *image = nullptr, *other = nullptr;  // other: null where there is none near in time
   };
 
-  std::string About(std::size_t i) const { return file_.string() + ": frame " + std::to_string(i) + ": "; }
-
   // The depth or right image, if there is one; or what is wrong with it.
-  std::string AddDepth(const Frame& at, std::size_t i, InputFrame* frame) const {
+  std::string AddOther(const Frame& at, std::size_t i, InputFrame* frame) const {
+    if (at.other == nullptr) return {};
     try {
-      if (at.right != nullptr)
-        frame->right = ReadPixels(*at.right, options_.right_topic, Pixels::kGrey, rig_.right);
-      if (at.depth != nullptr) frame->depth_m = ReadDepth(*at.depth);
+      if (options_.sensor == Sensor::kStereo)
+        frame->right = ReadPixels(*at.other, other_topic_, Pixels::kGrey, rig_.right);
+      else
+        frame->depth_m = ReadDepth(*at.other);
       return {};
     } catch (const std::exception& e) {
-      return About(i) + (at.depth != nullptr ? options_.depth_topic : options_.right_topic) + ": " + e.what();
+      return About(i) + ": " + other_topic_ + ": " + e.what();
     }
   }
 
-  // Topics that the options leave open, and all that are there for messages.
   void FindTopics() {
     std::vector<std::string> images;
     std::string list;
@@ -99,24 +89,24 @@ class BagDataset : public Dataset {
       images.push_back(topic.name);
       list += " " + topic.name;
     }
-    if (images.empty()) {
-      throw InputError(file_.string() + ": holds no topic of sensor_msgs/Image or CompressedImage" +
+    if (images.empty())
+      throw InputError(name_ + ": holds no topic of sensor_msgs/Image or CompressedImage" +
                        (bag_->damage().empty() ? "" : "; it is damaged (" + bag_->damage() + ")"));
-    }
     if (options_.topic.empty() && images.size() == 1) options_.topic = images.front();
     const auto check = [&](const char* key, const std::string& topic) {
       if (std::find(images.begin(), images.end(), topic) != images.end()) return;
       throw InputError(
-          file_.string() + ": " +
+          name_ + ": " +
           (topic.empty() ? std::string("which images? Set ") : "has no images of '" + topic + "'; set ") +
           "dataset." + key + " to one of:" + list);
     };
     check("topic", options_.topic);
-    if (options_.sensor == Sensor::kStereo) check("right_topic", options_.right_topic);
-    if (options_.sensor == Sensor::kRgbd) check("depth_topic", options_.depth_topic);
+    if (options_.sensor == Sensor::kMono) return;
+    const bool stereo = options_.sensor == Sensor::kStereo;
+    other_topic_ = stereo ? options_.right_topic : options_.depth_topic;
+    check(stereo ? "right_topic" : "depth_topic", other_topic_);
   }
 
-  // Messages of a topic, with the stamps in their headers.
   Messages Find(const std::string& topic) {
     Messages messages = bag_->Messages(topic);
     const std::size_t stored = messages.size();
@@ -127,14 +117,12 @@ class BagDataset : public Dataset {
                                   [](const BagMessage& m) { return std::isnan(m.stamp_s); }),
                    messages.end());
     const std::size_t all = stored + bag_->Lost(topic);
-    if (messages.size() < all) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(all - messages.size()) + " of " +
-                          std::to_string(all) + " images of " + topic + " can't be read and are skipped");
-    }
+    if (messages.size() < all)
+      Warn(PartText(all - messages.size(), all) + " images of " + topic + " can't be read and are skipped");
     return messages;
   }
 
-  // Of the header of a message that is compressed; nan: it is damaged.
+  // The message is compressed; nan: it is damaged.
   double StampOfPacked(const BagMessage& message) const {
     MessageHead head = {};
     try {
@@ -154,16 +142,13 @@ class BagDataset : public Dataset {
   }
 
   void UseTimesOfReceipt() {
-    const std::array<std::pair<Messages*, const std::string*>, 3> all = {
-        {{&images_, &options_.topic}, {&right_, &options_.right_topic}, {&depth_, &options_.depth_topic}}};
-    const auto constant =
-        std::find_if(all.begin(), all.end(), [](const auto& one) { return StampsAreConstant(*one.first); });
-    if (constant == all.end()) return;
-    warnings_.push_back(file_.string() + ": all images of " + *constant->second +
-                        " have the same stamp in their headers (" +
-                        std::to_string(constant->first->front().stamp_s) +
-                        " s); the times at which they were recorded are used");
-    for (const auto& [messages, topic] : all) {
+    const bool first = StampsAreConstant(images_);
+    if (!first && !StampsAreConstant(others_)) return;
+    Warn("all images of " + (first ? options_.topic : other_topic_) +
+         " have the same stamp in their headers (" +
+         std::to_string((first ? images_ : others_).front().stamp_s) +
+         " s); the times at which they were recorded are used");
+    for (Messages* messages : {&images_, &others_}) {
       for (BagMessage& m : *messages) m.stamp_s = m.received_s;
     }
   }
@@ -173,15 +158,12 @@ class BagDataset : public Dataset {
     Messages kept;
     for (const BagMessage& m : messages) {
       if (!kept.empty() && m.stamp_s < kept.back().stamp_s)
-        throw InputError(
-            StampsJumpBack(file_.string() + ": " + topic, kept.size(), kept.back().stamp_s, m.stamp_s));
+        throw InputError(StampsJumpBack(name_ + ": " + topic, kept.size(), kept.back().stamp_s, m.stamp_s));
       if (kept.empty() || m.stamp_s > kept.back().stamp_s) kept.push_back(m);
     }
-    if (kept.size() < messages.size()) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(messages.size() - kept.size()) + " of " +
-                          std::to_string(messages.size()) + " images of " + topic +
-                          " repeat a time stamp and are skipped");
-    }
+    if (kept.size() < messages.size())
+      Warn(PartText(messages.size() - kept.size(), messages.size()) + " images of " + topic +
+           " repeat a time stamp and are skipped");
     const std::size_t all = bag_->Messages(topic).size() + bag_->Lost(topic);
     if (topic == options_.topic && !kept.empty())
       skipped_share_ = 1 - static_cast<double>(kept.size()) / static_cast<double>(all);
@@ -200,33 +182,26 @@ class BagDataset : public Dataset {
   }
 
   void Index() {
+    const bool mono = options_.sensor == Sensor::kMono, stereo = options_.sensor == Sensor::kStereo;
     images_ = Find(options_.topic);
-    if (options_.sensor == Sensor::kStereo) right_ = Find(options_.right_topic);
-    if (options_.sensor == Sensor::kRgbd) depth_ = Find(options_.depth_topic);
+    if (!mono) others_ = Find(other_topic_);
     UseTimesOfReceipt();
     images_ = InOrder(images_, options_.topic);
-    right_ = InOrder(right_, options_.right_topic);
-    depth_ = InOrder(depth_, options_.depth_topic);
+    others_ = InOrder(others_, other_topic_);
     std::size_t alone = 0;
     for (const BagMessage& image : images_) {
-      Frame frame;
-      frame.image = &image;
-      frame.right = Nearest(right_, image.stamp_s, 0.0025);
-      frame.depth = Nearest(depth_, image.stamp_s, options_.max_association_s);
-      if (frame.right == nullptr && frame.depth == nullptr) ++alone;
-      frames_.push_back(frame);
+      frames_.push_back(
+          {&image, Nearest(others_, image.stamp_s, stereo ? 0.0025 : options_.max_association_s)});
+      if (frames_.back().other == nullptr) ++alone;
     }
-    if (options_.sensor == Sensor::kMono) return;
-    const std::string what = options_.sensor == Sensor::kRgbd ? "depth" : "right";
-    if (alone == frames_.size()) {
-      throw InputError(file_.string() + ": no image of " + options_.topic + " has its " + what +
+    if (mono) return;
+    const std::string what = stereo ? "right" : "depth";
+    if (alone == frames_.size())
+      throw InputError(name_ + ": no image of " + options_.topic + " has its " + what +
                        " image near it in time");
-    }
-    if (alone > 0) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(alone) + " of " +
-                          std::to_string(frames_.size()) + " images of " + options_.topic + " have no " +
-                          what + " image near them in time and are tracked without");
-    }
+    if (alone > 0)
+      Warn(PartText(alone, frames_.size()) + " images of " + options_.topic + " have no " + what +
+           " image near them in time and are tracked without");
   }
 
   // The camera_info beside the images of a topic, of the size that they have.
@@ -243,7 +218,7 @@ class BagDataset : public Dataset {
     try {
       CameraInfo info = DecodeCameraInfo(bag_->Read(infos.front()), found->serialization, "the bag");
       if (!info.IsCalibrated()) return std::nullopt;
-      std::string note = file_.string() + ": calibration of " + topic;
+      std::string note = "calibration of " + topic;
       if (OfRectified(images) && info.P[0] > 0) note += ", P, as the images are rectified";
       if (!info.window.IsWhole()) {
         // Drivers that do not follow REP 104 state the size, and K, of the images that they send.
@@ -251,10 +226,10 @@ class BagDataset : public Dataset {
         note += ", " + info.window.Text() + (as_sent ? " in it already" : " applied");
         if (as_sent) info.window = {};
       }
-      warnings_.push_back(note);
+      Warn(note);
       return info;
     } catch (const InputError& e) {
-      throw InputError(file_.string() + ": " + topic + ": " + e.what());
+      throw InputError(name_ + ": " + topic + ": " + e.what());
     }
   }
 
@@ -264,7 +239,7 @@ class BagDataset : public Dataset {
   }
 
   PinholeCamera CameraOf(const CameraInfo& info, const std::string& images) const {
-    const std::string source = file_.string() + ": camera_info of " + images;
+    const std::string source = name_ + ": camera_info of " + images;
     return Windowed(OfRectified(images) && info.P[0] > 0 ? info.Rectified() : info.Raw(source), info.window,
                     source);
   }
@@ -280,7 +255,7 @@ class BagDataset : public Dataset {
     if (!right || !(left->P[0] > 0) || !(right->P[0] > 0)) return;  // RectifyRig says what is missing
     const double baseline_m = left->P[3] / left->P[0] - right->P[3] / right->P[0];
     if (baseline_m < 0)
-      throw InputError(file_.string() + ": P of the camera_infos says that " + options_.right_topic +
+      throw InputError(name_ + ": P of the camera_infos says that " + options_.right_topic +
                        " is the left camera; exchange dataset.topic and right_topic");
     if (OfRectified(options_.topic)) {
       options_.baseline_m = baseline_m;
@@ -292,75 +267,62 @@ class BagDataset : public Dataset {
       for (std::size_t i = 0; i < options_.T_right_left.size(); ++i)
         options_.T_right_left[i] = T(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
     } catch (const InputError& e) {
-      throw InputError(file_.string() + ": R of the camera_infos " + e.what() +
+      throw InputError(name_ + ": R of the camera_infos " + e.what() +
                        "; give both cameras with --calibration");
     }
     options_.right = CameraOf(*right, options_.right_topic);
   }
 
-  void SetUpRig() {
-    MessageImage first;
-    for (std::size_t i = 0; i < std::min<std::size_t>(50, frames_.size()) && first.image.empty(); ++i)
-      first = Decode(*frames_[i].image, options_.topic, Pixels::kGrey);
-    if (first.image.empty())
-      throw InputError(file_.string() + ": none of the first images can be read: " + first.error);
-    size_ = first.image.size();
-    range_ = RangeOf({first.image});
-    if (range_.narrow) warnings_.push_back(file_.string() + ": " + RangeText(range_));
+  void FindRig() {
+    cv::Mat first;
+    std::string error;
+    for (std::size_t i = 0; i < std::min<std::size_t>(50, frames_.size()) && first.empty(); ++i) {
+      try {
+        first = Decode(*frames_[i].image, options_.topic, Pixels::kGrey).image;
+      } catch (const InputError& e) {
+        error = e.what();
+      }
+    }
+    if (first.empty()) throw InputError(name_ + ": none of the first images can be read: " + error);
+    size_ = first.size();
+    range_ = RangeOf({first});
+    if (range_.narrow) Warn(RangeText(range_));
     FindCameras();
     const double span = Stamp(frames_.size() - 1) - Stamp(0);
-    const double rate = span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0;
-    rig_ = RectifyRig(file_.string(), options_, size_, rate, warnings_);
-    mask_ = MaskOfAll(options_, size_, rig_.left);
+    SetUpRig(span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0);
   }
 
+  // An image of size_, once that is known. Throws InputError.
   MessageImage Decode(const BagMessage& message, const std::string& topic, Pixels pixels) const {
-    try {
-      const Bag::Topic& found = *bag_->Find(topic);  // FindTopics saw it
-      return DecodeImageMessage(bag_->Read(message), found.type, found.serialization, pixels);
-    } catch (const InputError& e) {
-      MessageImage none;
-      none.error = e.what();
-      return none;
-    }
-  }
-
-  // Throws InputError.
-  MessageImage OfTheSize(const BagMessage& message, const std::string& topic, Pixels pixels) const {
-    MessageImage read = Decode(message, topic, pixels);
+    const Bag::Topic& found = *bag_->Find(topic);  // FindTopics saw it
+    MessageImage read = DecodeImageMessage(bag_->Read(message), found.type, found.serialization, pixels);
     if (read.image.empty()) throw InputError(read.error);
-    if (read.image.size() != size_) throw InputError("an image has another size than the first one");
+    if (!size_.empty() && read.image.size() != size_)
+      throw InputError("an image has another size than the first one");
     return read;
   }
 
   // 8 bit, rectified.
   cv::Mat ReadPixels(const BagMessage& message, const std::string& topic, Pixels pixels,
                      const std::optional<Rectifier>& rectifier) const {
-    const cv::Mat image = OfTheSize(message, topic, pixels).image;
+    const cv::Mat image = Decode(message, topic, pixels).image;
     if (image.depth() != CV_8U && image.depth() != CV_16U)
       throw InputError(topic + ": pixels are neither 8 nor 16 bit");
-    cv::Mat out = To8Bit(image, range_);
-    return rectifier ? rectifier->Apply(out) : out;
+    return Rectified(rectifier, To8Bit(image, range_));
   }
 
   cv::Mat ReadDepth(const BagMessage& message) const {
-    const MessageImage read = OfTheSize(message, options_.depth_topic, Pixels::kStored);
-    if (read.image.channels() != 1) throw InputError(options_.depth_topic + ": is no depth image");
-    cv::Mat depth =
-        DepthInMetres(read.image, read.metres ? 1.0 : DepthUnits(options_, kRosUnits), options_.max_depth_m);
-    return rig_.left ? rig_.left->Apply(depth, Sampling::kNearest) : depth;
+    const MessageImage read = Decode(message, other_topic_, Pixels::kStored);
+    if (read.image.channels() != 1) throw InputError(other_topic_ + ": is no depth image");
+    const double units = read.metres ? 1.0 : DepthUnits(options_, kRosUnits);
+    return Rectified(rig_.left, DepthInMetres(read.image, units, options_.max_depth_m), Sampling::kNearest);
   }
 
-  fs::path file_;
-  DatasetOptions options_;
   double skipped_share_ = 0;
-  RectifiedRig rig_;
-  cv::Size size_;
   GreyRange range_;
-  std::vector<std::string> warnings_;
-  cv::Mat mask_;  // rectified; empty: none
   std::unique_ptr<Bag> bag_;
-  Messages images_, right_, depth_;
+  std::string other_topic_;  // of right or depth images; empty: mono
+  Messages images_, others_;
   std::vector<Frame> frames_;
 };
 

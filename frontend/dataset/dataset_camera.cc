@@ -1,16 +1,13 @@
 // Live cameras: camera:0, a pair camera:0,1, a stream rtsp://...; or videos in their stead: camera:FILE, a
 // pipe. Frames come once, in order.
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <chrono>
-#include <map>
 #include <mutex>
 
 #include "core/stopwatch.h"
 #include "frontend/dataset/camera_input.h"
 #include "frontend/dataset/dataset_folder.h"
-#include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -18,11 +15,10 @@ namespace {
 
 constexpr const char* kPrefix = "camera:";
 
-class CameraDataset : public Dataset {
+class CameraDataset : public RecordedDataset {
  public:
   CameraDataset(const std::string& name, const DatasetOptions& options)
-      : name_(name),
-        options_(options),
+      : RecordedDataset(name, options),
         device_(IsCameraDevice(name)),
         first_(Open(0)),
         second_(CameraSources(name).size() > 1 ? std::make_optional(Open(1)) : std::nullopt) {
@@ -42,8 +38,7 @@ class CameraDataset : public Dataset {
     CheckFirst(frames_.at(0));
     if (first_.Video() != nullptr)
       options_.camera = CameraOfVideo(name_, *first_.Video(), options_, size_, warnings_);
-    rig_ = RectifyRig(name_, options_, size_, rate_hz_, warnings_);
-    mask_ = MaskOfAll(options_, size_, rig_.left);
+    SetUpRig(rate_hz_);
   }
 
   Supply FrameSupply() const override { return Supply::kOnce; }
@@ -61,14 +56,7 @@ class CameraDataset : public Dataset {
     }
     return true;
   }
-  const CameraRig& Rig() const override { return rig_.rig; }
   int TurnedBy() const override { return first_.Video() != nullptr ? first_.Video()->TurnedBy() : 0; }
-  std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
-  const std::vector<std::string>& Warnings() const override { return warnings_; }
-  Trajectory ReadGroundTruth(const std::filesystem::path& file,
-                             std::vector<std::string>* warnings) const override {
-    return ReadTrajectory(file, GuessTrajectoryFormat(file), warnings);
-  }
 
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
@@ -96,7 +84,6 @@ class CameraDataset : public Dataset {
  private:
   bool SideBySide() const { return options_.sensor == Sensor::kStereo && !second_; }
   bool Depth() const { return options_.sensor == Sensor::kRgbd; }
-  std::string About(std::size_t i) const { return name_ + ": frame " + std::to_string(i); }
 
   CameraInput Open(std::size_t which) const {
     const std::vector<std::string> sources = CameraSources(name_);
@@ -119,8 +106,8 @@ class CameraDataset : public Dataset {
       throw InputError(name_ + ": with sensor stereo, one camera gives both images side by side, but " +
                        SizeText(size_) + " pixels have an odd width; give two cameras (LEFT,RIGHT)");
     if (SideBySide() && size_.width < size_.height)
-      warnings_.push_back(name_ + ": taken as two images of " + SizeText(size_) +
-                          " side by side, as sensor is stereo; for one image set it to mono");
+      Warn("taken as two images of " + SizeText(size_) +
+           " side by side, as sensor is stereo; for one image set it to mono");
     if (!second_) return;
     if (!taken.depth_error.empty()) throw InputError(taken.depth_error);
     const cv::Size second = Depth() ? frame.depth_m.size() : frame.right.size();
@@ -191,20 +178,14 @@ class CameraDataset : public Dataset {
                            (Depth() ? "depth" : "right") + " image has another size than the first";
       second.release();
     }
-    if (rig_.left) frame.image = rig_.left->Apply(frame.image);
-    if (!frame.right.empty() && rig_.right) frame.right = rig_.right->Apply(frame.right);
+    frame.image = Rectified(rig_.left, frame.image);
+    if (!frame.right.empty()) frame.right = Rectified(rig_.right, frame.right);
     if (frame.depth_m.empty()) return;
-    frame.depth_m = DepthInMetres(frame.depth_m, DepthUnits(options_, 0), options_.max_depth_m);
-    if (rig_.left) frame.depth_m = rig_.left->Apply(frame.depth_m, Sampling::kNearest);
+    const cv::Mat metres = DepthInMetres(frame.depth_m, DepthUnits(options_, 0), options_.max_depth_m);
+    frame.depth_m = Rectified(rig_.left, metres, Sampling::kNearest);
   }
 
-  std::string name_;
-  DatasetOptions options_;
   bool device_ = false;
-  RectifiedRig rig_;
-  cv::Size size_;  // of the left image
-  cv::Mat mask_;
-  std::vector<std::string> warnings_;
   double rate_hz_ = 30;
   const internal::Stopwatch since_begin_;
   const double begin_s_ =

@@ -11,11 +11,27 @@
 #include "tutti/core/text.h"
 
 namespace tutti {
-std::string At(const std::filesystem::path& file, std::size_t line) {
+namespace {
+
+namespace fs = std::filesystem;
+
+// From a left-handed frame with y up into the right-handed one with y down: S R S with S = diag(1, -1, 1)
+// turns the same angle about the mirrored axis, the other way round.
+void MirrorY(Trajectory& trajectory) {
+  for (StampedPose& p : trajectory) {
+    p.pose.translation.y() *= -1;
+    const Eigen::Quaterniond q = p.pose.rotation;
+    p.pose.rotation = Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z());
+  }
+}
+
+}  // namespace
+
+std::string At(const fs::path& file, std::size_t line) {
   return file.string() + ":" + std::to_string(line) + ": ";
 }
 
-std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
+std::vector<TextLine> ReadTextLines(const fs::path& file) {
   internal::TextReader in(file);
   std::vector<TextLine> lines;
   std::string text;
@@ -28,33 +44,30 @@ std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
   return lines;
 }
 
-std::vector<TextLine> ReadListLines(const std::filesystem::path& file) {
+std::vector<TextLine> ReadListLines(const fs::path& file) {
   std::vector<TextLine> lines = ReadTextLines(file);
   const auto is_number = [&](std::size_t i) { return ParseDouble(lines[i].words.front()).has_value(); };
   if (lines.size() > 1 && !is_number(0) && is_number(1)) lines.erase(lines.begin());
   return lines;
 }
 
-double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word) {
-  if (word >= line.words.size()) {
+double NumberAt(const fs::path& file, const TextLine& line, std::size_t word) {
+  if (word >= line.words.size())
     throw InputError(At(file, line.number) + "has " + std::to_string(line.words.size()) +
                      " columns; at least " + std::to_string(word + 1) + " are needed");
-  }
   const std::optional<double> value = ParseDouble(line.words[word]);
   const std::string comma = internal::DecimalComma(line.text);
-  if (comma.rfind(line.words[word] + ",", 0) == 0) {
+  if (comma.rfind(line.words[word] + ",", 0) == 0)
     throw InputError(At(file, line.number) + "'" + internal::Excerpt(comma) +
                      "' has a decimal comma; write decimal points");
-  }
-  if (!value || !std::isfinite(*value)) {
+  if (!value || !std::isfinite(*value))
     throw InputError(At(file, line.number) + "'" + internal::Excerpt(line.words[word]) +
                      "' is not a finite number; repair or remove the line");
-  }
   return *value;
 }
 
-std::vector<double> StampsAt(const std::filesystem::path& file, const std::vector<TextLine>& lines,
-                             StampUnit& unit, std::vector<std::string>& warnings, std::size_t word) {
+std::vector<double> StampsAt(const fs::path& file, const std::vector<TextLine>& lines, StampUnit& unit,
+                             std::vector<std::string>& warnings, std::size_t word) {
   std::vector<double> stamps;
   stamps.reserve(lines.size());
   for (const TextLine& line : lines) stamps.push_back(NumberAt(file, line, word));
@@ -66,14 +79,12 @@ std::vector<double> StampsAt(const std::filesystem::path& file, const std::vecto
   return stamps;
 }
 
-Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& poses,
-                          const TrajectoryDetails& details, std::size_t count,
-                          const std::vector<std::pair<std::int64_t, double>>& frames) {
-  if (!details.has_numbers && poses.size() != count) {
+Trajectory StampedByFrame(const fs::path& file, const Trajectory& poses, const TrajectoryDetails& details,
+                          std::size_t count, const std::vector<std::pair<std::int64_t, double>>& frames) {
+  if (!details.has_numbers && poses.size() != count)
     throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
                      " poses, but the sequence has " + std::to_string(count) +
                      " frames; KITTI poses need one line for each frame");
-  }
   Trajectory out;
   auto pose = poses.begin();
   for (const auto& [number, stamp_s] : frames) {
@@ -89,11 +100,10 @@ Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& p
 }
 
 bool StampOrder::Accept(std::size_t line, double stamp_s) {
-  if (last_ && stamp_s < *last_) {
+  if (last_ && stamp_s < *last_)
     throw InputError(At(file_, line) + "time stamp " + std::to_string(stamp_s) +
                      " s goes back in time (the one before is " + std::to_string(*last_) +
                      " s); sort the file by time, or cut it there if it is two recordings");
-  }
   if (last_ && stamp_s == *last_) {
     constexpr std::size_t kMostLines = 5;
     if (++skipped_ <= kMostLines + 1) warnings_.emplace_back();
@@ -107,37 +117,35 @@ bool StampOrder::Accept(std::size_t line, double stamp_s) {
   return true;
 }
 
-void WarnOfFramesWithoutDepth(const std::filesystem::path& list, std::size_t alone, const std::string& which,
-                              const DatasetOptions& options, FolderContents* contents) {
-  if (alone == 0 || options.follow_s > 0) return;
-  contents->warnings.push_back(list.string() + ": " + std::to_string(alone) + " of " +
-                               std::to_string(contents->frames.size()) + " " + which);
+void FolderContents::MeasureRate() {
+  if (frames.size() > 1)
+    rate_hz = static_cast<double>(frames.size() - 1) / (frames.back().stamp_s - frames.front().stamp_s);
 }
 
-void MirrorY(Trajectory& trajectory) {
-  // S R S with S = diag(1, -1, 1) turns the same angle about the mirrored axis, the other way round.
-  for (StampedPose& p : trajectory) {
-    p.pose.translation.y() *= -1;
-    const Eigen::Quaterniond q = p.pose.rotation;
-    p.pose.rotation = Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z());
-  }
+void FolderContents::ReportAlone(const fs::path& list, std::size_t alone, const std::string& none,
+                                 const std::string& some, const DatasetOptions& options) {
+  if (alone == frames.size()) throw InputError(list.string() + ": " + none);
+  if (alone == 0 || options.follow_s > 0) return;
+  warnings.push_back(list.string() + ": " + PartText(alone, frames.size()) + " " + some);
 }
 
 FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& options)
     : contents_(std::move(contents)), options_(options) {
-  if (contents_.frames.empty()) {
+  if (contents_.frames.empty())
     throw InputError(contents_.folder.string() +
                      ": holds no frame; check the folder and the options of the data set");
+  if (contents_.pose_stamps.empty()) {
+    contents_.pose_count = Size();
+    for (std::size_t i = 0; i < Size(); ++i) contents_.pose_stamps.emplace_back(i, Stamp(i));
   }
   FindImageSize();
-  SetUpRig();
+  rig_ = RectifyRig(contents_.folder.string(), contents_.rig, options_, size_, contents_.rate_hz);
   SetUpDepth();
   SetUpMasks();
 }
 
 void FolderDataset::FindImageSize() {
-  // The first image may be a damaged one; a folder without any good image among its first ones is not worth a
-  // run.
+  // A folder without any good image among its first ones is not worth a run.
   constexpr std::size_t kTries = 50;
   std::string first_error;
   for (std::size_t i = 0; i < std::min(kTries, Size()); ++i) {
@@ -153,7 +161,7 @@ void FolderDataset::FindImageSize() {
                    " images can be read");
 }
 
-// Of `first`, the first good image, whose place is `place`, and some later ones.
+// Looks at `first`, the first good image, whose place is `place`, and at some later ones.
 void FolderDataset::FindRange(std::size_t place, const cv::Mat& first) {
   constexpr std::size_t kLooked = 8;
   std::vector<cv::Mat> images = {first};
@@ -169,7 +177,7 @@ void FolderDataset::FindRange(std::size_t place, const cv::Mat& first) {
 
 void FolderDataset::SetUpDepth() {
   if (options_.sensor != Sensor::kRgbd) return;
-  depth_.emplace(options_, contents_.depth, contents_.left, size_);
+  depth_.emplace(options_, contents_.depth, contents_.rig.left, size_);
   if (options_.follow_s > 0) return;
   for (const FrameFiles& frame : contents_.frames) {
     if (frame.depth.empty()) continue;
@@ -178,26 +186,11 @@ void FolderDataset::SetUpDepth() {
   }
 }
 
-void FolderDataset::SetUpRig() {
-  RigCalibration calibration;
-  calibration.left = contents_.left;
-  calibration.right = contents_.right;
-  calibration.T_right_left = contents_.T_right_left;
-  calibration.baseline_m = contents_.baseline_m;
-  calibration.T_body_left = contents_.T_body_left;
-  RectifiedRig made =
-      RectifyRig(contents_.folder.string(), std::move(calibration), options_, size_, contents_.rate_hz);
-  rig_ = made.rig;
-  left_ = std::move(made.left);
-  right_ = std::move(made.right);
-}
-
 void FolderDataset::SetUpMasks() {
   if (options_.mask.empty()) return;
   ImageMasks masks(options_.mask);
   if (!masks.PerImage()) {
-    mask_ = masks.OfAll(size_);
-    if (left_) mask_ = left_->Apply(mask_, Sampling::kNearest);
+    mask_ = Rectified(rig_.left, masks.OfAll(size_), Sampling::kNearest);
     return;
   }
   masks_ = std::move(masks);
@@ -220,31 +213,25 @@ void FolderDataset::SetUpMasks() {
                                " have no mask; all of them is used");
 }
 
-cv::Mat FolderDataset::MaskOf(const std::filesystem::path& image) const {
+cv::Mat FolderDataset::MaskOf(const fs::path& image) const {
   if (!masks_) return mask_;
   const cv::Mat mask = masks_->Of(image.stem().string(), size_);
-  return mask.empty() || !left_ ? mask : left_->Apply(mask, Sampling::kNearest);
+  return mask.empty() ? mask : Rectified(rig_.left, mask, Sampling::kNearest);
 }
 
 // What is wrong with the image that was read from `file`; else `out` gets it, 8 bit and rectified.
-std::string FolderDataset::Rectify(const ImageFile& read, const std::filesystem::path& file,
-                                   const Rectifier* rectifier, cv::Mat& out) const {
+std::string FolderDataset::Rectify(const ImageFile& read, const fs::path& file,
+                                   const std::optional<Rectifier>& rectifier, cv::Mat& out) const {
   if (!read.error.empty()) return read.error;
-  if (read.image.size() != size_) {
+  if (read.image.size() != size_)
     return file.string() + ": has " + SizeText(read.image.size()) +
            " pixels, but the data set's images have " + SizeText(size_);
-  }
-  out = To8Bit(read.image, range_);
-  if (rectifier != nullptr) out = rectifier->Apply(out);
+  out = Rectified(rectifier, To8Bit(read.image, range_));
   return {};
 }
 
 ReadResult FolderDataset::Read(std::size_t i) const {
-  ReadResult result;
-  if (i >= Size()) {
-    result.error = NoFrame(i);
-    return result;
-  }
+  if (i >= Size()) return {std::nullopt, NoFrame(i), {}};
   return ReadFiles(i, contents_.frames[i]);
 }
 
@@ -261,7 +248,7 @@ std::string FolderDataset::NoFrame(std::size_t i) const {
 ColourImage FolderDataset::ReadColourOf(const FrameFiles& files) const {
   ColourImage out;
   try {
-    out.error = Rectify(ReadColourFile(files.image), files.image, left_ ? &*left_ : nullptr, out.image);
+    out.error = Rectify(ReadColourFile(files.image), files.image, rig_.left, out.image);
   } catch (const std::exception& e) {
     out = {cv::Mat(), files.image.string() + ": can't be used: " + e.what()};
   }
@@ -274,14 +261,12 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
     InputFrame frame;
     frame.index = Number(i);
     frame.stamp_s = files.stamp_s;
-    result.error = Rectify(ReadGreyFile(files.image), files.image, left_ ? &*left_ : nullptr, frame.image);
+    result.error = Rectify(ReadGreyFile(files.image), files.image, rig_.left, frame.image);
     if (!result.error.empty()) return result;
     frame.mask = MaskOf(files.image);
     if (!files.right.empty())
-      result.depth_error =
-          Rectify(ReadGreyFile(files.right), files.right, right_ ? &*right_ : nullptr, frame.right);
-    if (!files.depth.empty())
-      result.depth_error = depth_->Read(files.depth, left_ ? &*left_ : nullptr, frame.depth_m);
+      result.depth_error = Rectify(ReadGreyFile(files.right), files.right, rig_.right, frame.right);
+    if (!files.depth.empty()) result.depth_error = depth_->Read(files.depth, rig_.left, frame.depth_m);
     result.frame = std::move(frame);
   } catch (const std::exception& e) {  // out of memory for an absurd image size, and the like
     result.frame.reset();
@@ -290,25 +275,23 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
   return result;
 }
 
-std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
+std::optional<fs::path> FolderDataset::GroundTruthFile() const {
   std::error_code code;
   if (contents_.truth && HoldsTruth(*contents_.truth)) return contents_.truth->place;
-  for (const std::filesystem::path& file : contents_.truth_places) {
-    if (std::filesystem::is_regular_file(file, code)) return file;
+  for (const fs::path& file : contents_.truth_places) {
+    if (fs::is_regular_file(file, code)) return file;
     // A folder, or a link that leads nowhere: the run is not to end without its figures and without a word.
-    if (std::filesystem::exists(std::filesystem::symlink_status(file, code))) {
+    if (fs::exists(fs::symlink_status(file, code)))
       throw InputError(file.string() +
                        ": should be the ground truth, but is no readable file; repair or remove it, or give "
                        "--ground-truth FILE or none");
-    }
   }
   return std::nullopt;
 }
 
-Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
-                                          std::vector<std::string>* warnings) const {
+Trajectory FolderDataset::ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const {
   std::error_code code;
-  if (contents_.truth && std::filesystem::equivalent(file, contents_.truth->place, code))
+  if (contents_.truth && fs::equivalent(file, contents_.truth->place, code))
     return ReadLayoutTruth(*contents_.truth, warnings);
   TrajectoryDetails details;
   Trajectory poses =
@@ -317,12 +300,8 @@ Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
   internal::FitUnit({Stamp(0) / scale, Stamp(Size() - 1) / scale}, poses, details, warnings);
   if (details.has_stamps) {
     for (StampedPose& p : poses) p.stamp_s *= scale;
-  } else if (!contents_.pose_stamps.empty()) {
-    poses = StampedByFrame(file, poses, details, contents_.pose_count, contents_.pose_stamps);
   } else {
-    std::vector<std::pair<std::int64_t, double>> frames;
-    for (std::size_t i = 0; i < Size(); ++i) frames.emplace_back(i, Stamp(i));
-    poses = StampedByFrame(file, poses, details, Size(), frames);
+    poses = StampedByFrame(file, poses, details, contents_.pose_count, contents_.pose_stamps);
   }
   if (options_.mirrored_ground_truth) MirrorY(poses);
   return poses;

@@ -41,26 +41,35 @@ struct FrameFiles {
   ShortPath image, right, depth;
 };
 
+/// "2 of 9".
+inline std::string PartText(std::size_t part, std::size_t all) {
+  return std::to_string(part) + " of " + std::to_string(all);
+}
+
 /// What a reader finds out about its folder.
 struct FolderContents {
   std::filesystem::path folder;
   std::vector<FrameFiles> frames;  ///< stamps grow strictly
-  std::optional<PinholeCamera> left,
-      right;                         ///< as calibrated, width and height 0: the images'; right: EuRoC's
-  std::optional<Pose> T_right_left;  ///< set: pairs need rectification
-  double baseline_m = 0;             ///< of pairs that are rectified already
-  Pose T_body_left;                  ///< left camera as calibrated -> frame of the ground truth
+  RigCalibration rig;
   double rate_hz = 10;
   std::vector<std::filesystem::path> truth_places;  ///< the first that exists is the ground truth
   std::vector<std::pair<std::int64_t, double>>
-      pose_stamps;                             ///< KITTI: (line of the pose, stamp) of each frame
-  std::size_t pose_count = 0;                  ///< KITTI: poses that the file must have
+      pose_stamps;                             ///< (line of the pose, stamp) of each frame; empty: all
+  std::size_t pose_count = 0;                  ///< that a file without numbers must have
   StampUnit stamp_unit = StampUnit::kSeconds;  ///< of the images' stamps where they are written
   double stamp_scale = 1;                      ///< factor on the stamps of the ground truth
   std::size_t skipped = 0;           ///< (left, or colour) images that are no frames: Dataset::SkippedShare
   std::optional<LayoutTruth> truth;  ///< in a form of the layout's own; goes before truth_places
   DepthFormat depth;
   std::vector<std::string> warnings;
+
+  /// Sets rate_hz to the mean rate of the frames, if there are two.
+  void MeasureRate();
+  /// `alone` of the frames have no depth or right image, which `list` names. All: throws InputError, "`list`:
+  /// `none`"; some: warns, "`list`: 2 of 9 `some`", but not of a folder that grows, where they may still
+  /// come.
+  void ReportAlone(const std::filesystem::path& list, std::size_t alone, const std::string& none,
+                   const std::string& some, const DatasetOptions& options);
 };
 
 /// A data set of image files. Immutable after construction.
@@ -73,11 +82,11 @@ class FolderDataset : public Dataset {
   double Stamp(std::size_t i) const override { return contents_.frames.at(i).stamp_s; }
   ReadResult Read(std::size_t i) const override;
   ColourImage ReadColour(std::size_t i) const override;
-  /// The same for a frame `i` that came later.
+  /// Read frame `i`, which may have come later.
   ReadResult ReadFiles(std::size_t i, const FrameFiles& files) const;
   ColourImage ReadColourOf(const FrameFiles& files) const;
   const std::vector<FrameFiles>& Frames() const { return contents_.frames; }
-  const CameraRig& Rig() const override { return rig_; }
+  const CameraRig& Rig() const override { return rig_.rig; }
   std::optional<std::filesystem::path> GroundTruthFile() const override;
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override;
@@ -90,24 +99,53 @@ class FolderDataset : public Dataset {
  private:
   void FindImageSize();
   void FindRange(std::size_t place, const cv::Mat& first);
-  void SetUpRig();
   void SetUpDepth();
   void SetUpMasks();
-  std::string Rectify(const ImageFile& read, const std::filesystem::path& file, const Rectifier* rectifier,
-                      cv::Mat& out) const;
+  std::string Rectify(const ImageFile& read, const std::filesystem::path& file,
+                      const std::optional<Rectifier>& rectifier, cv::Mat& out) const;
   std::string NoFrame(std::size_t i) const;
   // Rectified; empty if this image has none. Throws InputError.
   cv::Mat MaskOf(const std::filesystem::path& image) const;
 
   FolderContents contents_;
   DatasetOptions options_;
-  CameraRig rig_;
+  RectifiedRig rig_;
   cv::Size size_;
   GreyRange range_;
   std::optional<DepthReader> depth_;
-  std::optional<Rectifier> left_, right_;
   std::optional<ImageMasks> masks_;  // a mask for each image
   cv::Mat mask_;                     // for all images, rectified; empty: none
+};
+
+/// What videos, bags and cameras have in common: images of one rig in one recording, without ground truth
+/// beside it.
+class RecordedDataset : public Dataset {
+ public:
+  const CameraRig& Rig() const override { return rig_.rig; }
+  std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
+  Trajectory ReadGroundTruth(const std::filesystem::path& file,
+                             std::vector<std::string>* warnings) const override {
+    return ReadTrajectory(file, GuessTrajectoryFormat(file), warnings);
+  }
+  const std::vector<std::string>& Warnings() const override { return warnings_; }
+
+ protected:
+  RecordedDataset(std::string name, const DatasetOptions& options)
+      : name_(std::move(name)), options_(options) {}
+  /// By size_ and options_.
+  void SetUpRig(double rate_hz) {
+    rig_ = RectifyRig(name_, options_, size_, rate_hz, warnings_);
+    mask_ = MaskOfAll(options_, size_, rig_.left);
+  }
+  void Warn(const std::string& text) { warnings_.push_back(name_ + ": " + text); }
+  std::string About(std::size_t i) const { return name_ + ": frame " + std::to_string(i); }
+
+  const std::string name_;  // for messages
+  DatasetOptions options_;
+  cv::Size size_;  // of the (left) images as they are stored
+  RectifiedRig rig_;
+  cv::Mat mask_;  // rectified; empty: none
+  std::vector<std::string> warnings_;
 };
 
 /// One line of a text file: its number and its words, comments removed.
@@ -158,14 +196,6 @@ std::vector<int> AssociateStamps(const std::vector<double>& a, const std::vector
 
 /// Position of a camera in camera 0, from P = K [I | t].
 Eigen::Vector3d PositionOfCamera(const Eigen::Matrix<double, 3, 4>& p);
-
-/// Warns that `alone` of the frames have no depth or right image: "`list`: 2 of 9 `which`". Not of a folder
-/// that grows, where they may still come.
-void WarnOfFramesWithoutDepth(const std::filesystem::path& list, std::size_t alone, const std::string& which,
-                              const DatasetOptions& options, FolderContents* contents);
-
-/// Mirrors a trajectory that is given in a left-handed frame with y up into the right-handed one with y down.
-void MirrorY(Trajectory& trajectory);
 
 FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options);

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <mutex>
 #include <thread>
-#include <utility>
 
 #include "core/stopwatch.h"
 #include "frontend/dataset/dataset_folder.h"

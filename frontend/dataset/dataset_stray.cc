@@ -1,7 +1,6 @@
 // Stray Scanner (iPhone): rgb.mp4, camera_matrix.csv, odometry.csv, depth/*.png in millimetres, smaller than
 // the video's images and of the same view. https://docs.strayrobots.io/apps/scanner/format.html
 #include <cmath>
-#include <map>
 
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"
@@ -47,8 +46,7 @@ class StrayDataset : public Dataset {
     result.frame->stamp_s = stamps_[i];
     if (!reader_ || depth_[i].empty()) return result;
     try {
-      result.depth_error =
-          reader_->Read(depth_[i], rectifier_ ? &*rectifier_ : nullptr, result.frame->depth_m);
+      result.depth_error = reader_->Read(depth_[i], rectifier_, result.frame->depth_m);
     } catch (const std::exception& e) {
       result.depth_error = depth_[i].string() + ": can't be used: " + e.what();
     }
@@ -67,7 +65,7 @@ class StrayDataset : public Dataset {
   const std::vector<std::string>& Warnings() const override { return warnings_; }
 
  private:
-  // Of the lines of odometry.csv, which name their frames; without it, the video's own.
+  // The lines of odometry.csv have stamps and name their frames; without it, the video's own are used.
   void FindStamps() {
     std::error_code ignored;
     if (!fs::is_regular_file(truth_.place, ignored)) {

@@ -11,9 +11,11 @@
 namespace tutti {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct StampedFile {
   double stamp_s = 0;
-  std::filesystem::path file;
+  fs::path file;
 };
 
 // OpenLORIS-Scene: its D435i's colour camera in the frame of the robot (base_link), whose poses the ground
@@ -21,7 +23,7 @@ struct StampedFile {
 // parent.
 constexpr const char* kLorisCamera = "d400_color_optical_frame";
 
-std::vector<double> MatrixOf(const std::filesystem::path& file, const cv::FileNode& node, std::size_t count) {
+std::vector<double> MatrixOf(const fs::path& file, const cv::FileNode& node, std::size_t count) {
   cv::Mat values;
   node >> values;
   if (values.total() != count || values.channels() != 1)
@@ -32,45 +34,40 @@ std::vector<double> MatrixOf(const std::filesystem::path& file, const cv::FileNo
   return {values.ptr<double>(0), values.ptr<double>(0) + count};
 }
 
-Pose LorisMount(const std::filesystem::path& file) {
+Pose LorisMount(const fs::path& file) {
   const cv::FileStorage storage(file.string(), cv::FileStorage::READ);
   Pose T_base_camera;
   std::string frame = kLorisCamera;
   const cv::FileNode transforms = storage["trans_matrix"];
   for (std::size_t tried = 0; frame != "base_link"; ++tried) {
-    bool found = false;
-    for (const cv::FileNode& transform : transforms) {
-      if (static_cast<std::string>(transform["child_frame"]) != frame) continue;
-      const std::vector<double> v = MatrixOf(file, transform["matrix"], 16);
-      TransformRows rows;
-      std::copy(v.begin(), v.end(), rows.begin());
-      const std::optional<Pose> T = RigidTransform(rows);
-      if (!T) throw InputError(file.string() + ": a transform is zero");
-      T_base_camera = *T * T_base_camera;
-      frame = static_cast<std::string>(transform["parent_frame"]);
-      found = true;
-      break;
-    }
-    if (!found || tried > transforms.size())
+    auto found = transforms.begin();
+    while (found != transforms.end() && static_cast<std::string>((*found)["child_frame"]) != frame) ++found;
+    if (found == transforms.end() || tried > transforms.size())
       throw InputError(file.string() + ": no transforms lead from " + kLorisCamera + " to base_link");
+    const std::vector<double> v = MatrixOf(file, (*found)["matrix"], 16);
+    TransformRows rows;
+    std::copy(v.begin(), v.end(), rows.begin());
+    const std::optional<Pose> T = RigidTransform(rows);
+    if (!T) throw InputError(file.string() + ": a transform is zero");
+    T_base_camera = *T * T_base_camera;
+    frame = static_cast<std::string>((*found)["parent_frame"]);
   }
   return T_base_camera;
 }
 
-LayoutCalibration ReadLoris(const std::filesystem::path& folder) {
+LayoutCalibration ReadLoris(const fs::path& folder) {
   LayoutCalibration out;
   std::error_code code;
-  const std::filesystem::path sensors = folder / "sensors.yaml", mount = folder / "trans_matrix.yaml";
+  const fs::path sensors = folder / "sensors.yaml", mount = folder / "trans_matrix.yaml";
   try {
-    if (std::filesystem::is_regular_file(sensors, code)) {
+    if (fs::is_regular_file(sensors, code)) {
       const cv::FileStorage storage(sensors.string(), cv::FileStorage::READ);
       const cv::FileNode node = storage[kLorisCamera];
       const std::vector<double> v = MatrixOf(sensors, node["intrinsics"], 4);
-      PinholeCamera& camera = out.rig.left.emplace();
-      camera.fx = v[0], camera.cx = v[1], camera.fy = v[2], camera.cy = v[3];
+      out.rig.left = Pinhole(v[0], v[2], v[1], v[3]);
       out.source = "sensors.yaml";
     }
-    if (std::filesystem::is_regular_file(mount, code)) out.rig.T_body_left = LorisMount(mount);
+    if (fs::is_regular_file(mount, code)) out.rig.T_body_left = LorisMount(mount);
   } catch (const cv::Exception&) {
     throw InputError(folder.string() + ": sensors.yaml or trans_matrix.yaml can't be read as YAML of OpenCV");
   }
@@ -78,7 +75,7 @@ LayoutCalibration ReadLoris(const std::filesystem::path& folder) {
 }
 
 // What follows the stamp. It may have blanks and commas if such a file is there. Empty: no name.
-std::string NameIn(const TextLine& line, const std::filesystem::path& folder) {
+std::string NameIn(const TextLine& line, const fs::path& folder) {
   if (line.words.size() < 2) return {};
   if (line.words.size() == 2) return line.words[1];
   constexpr const char* kBlank = " \t\r,";
@@ -86,26 +83,24 @@ std::string NameIn(const TextLine& line, const std::filesystem::path& folder) {
   const std::size_t begin = line.text.find_first_not_of(kBlank, stamp);
   std::string name = line.text.substr(begin, line.text.find_last_not_of(kBlank) + 1 - begin);
   std::error_code code;
-  return std::filesystem::exists(folder / name, code) ? name : std::string();
+  return fs::exists(folder / name, code) ? name : std::string();
 }
 
 // `skipped`: lines that are of no use; may be null.
-std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name, StampUnit& unit,
+std::vector<StampedFile> ReadList(const fs::path& folder, const char* name, StampUnit& unit,
                                   std::vector<std::string>& warnings, std::size_t* skipped) {
-  const std::filesystem::path list = folder / name;
+  const fs::path list = folder / name;
   std::vector<StampedFile> files;
   StampOrder order(list, warnings);
   const std::vector<TextLine> lines = ReadListLines(list);
   const std::vector<double> stamps = StampsAt(list, lines, unit, warnings);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const TextLine& line = lines[i];
-    const double stamp = stamps[i];
-    const std::string name_in_list = NameIn(line, folder);
-    if (name_in_list.empty()) {
+    const std::string file = NameIn(line, folder);
+    if (file.empty())
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
                        " columns; 2 are needed: time stamp [s] and file name");
-    }
-    if (order.Accept(line.number, stamp)) files.push_back({stamp, folder / name_in_list});
+    if (order.Accept(line.number, stamps[i])) files.push_back({stamps[i], folder / file});
   }
   if (skipped != nullptr) *skipped = order.skipped();
   if (files.empty())
@@ -119,7 +114,7 @@ std::vector<double> StampsOf(const std::vector<StampedFile>& files) {
   return stamps;
 }
 
-void FromLists(const std::filesystem::path& folder, const TumLists& lists, const DatasetOptions& options,
+void FromLists(const fs::path& folder, const TumLists& lists, const DatasetOptions& options,
                FolderContents& out) {
   const std::vector<StampedFile> colour =
       ReadList(folder, lists.colour, out.stamp_unit, out.warnings, &out.skipped);
@@ -142,29 +137,23 @@ void FromLists(const std::filesystem::path& folder, const TumLists& lists, const
     out.frames.push_back(std::move(frame));
   }
   if (options.sensor != Sensor::kRgbd) return;
-  if (alone == colour.size()) {
-    throw InputError((folder / lists.depth).string() + ": no depth image is within " +
-                     std::to_string(options.max_association_s) + " s of a colour image of " + lists.colour +
-                     "; check the time stamps or raise max_association_s");
-  }
-  WarnOfFramesWithoutDepth(folder / lists.depth, alone,
-                           "colour images have no depth image within " +
-                               std::to_string(options.max_association_s) +
-                               " s and are tracked with colour alone",
-                           options, &out);
+  const std::string limit = std::to_string(options.max_association_s) + " s";
+  out.ReportAlone(folder / lists.depth, alone,
+                  "no depth image is within " + limit + " of a colour image of " + lists.colour +
+                      "; check the time stamps or raise max_association_s",
+                  "colour images have no depth image within " + limit + " and are tracked with colour alone",
+                  options);
 }
 
 // "stamp file stamp file". TUM puts colour first, ICL-NUIM depth: the folder's name tells.
-void FromAssociations(const std::filesystem::path& folder, const DatasetOptions& options,
-                      FolderContents& out) {
-  const std::filesystem::path list = folder / "associations.txt";
+void FromAssociations(const fs::path& folder, const DatasetOptions& options, FolderContents& out) {
+  const fs::path list = folder / "associations.txt";
   const std::vector<TextLine> lines = ReadListLines(list);
   StampOrder order(list, out.warnings);
   for (const TextLine& line : lines) {
-    if (line.words.size() != 4) {
+    if (line.words.size() != 4)
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
                        " columns; 4 are needed: stamp, colour file, stamp, depth file");
-    }
   }
   const bool depth_first =
       !lines.empty() && (lines[0].words[1].rfind("depth", 0) == 0 || lines[0].words[3].rfind("rgb", 0) == 0);
@@ -194,21 +183,21 @@ void FromAssociations(const std::filesystem::path& folder, const DatasetOptions&
 
 }  // namespace
 
-TumLists TumListsOf(const std::filesystem::path& folder) {
+TumLists TumListsOf(const fs::path& folder) {
   std::error_code code;
-  const auto is = [&](const char* name) { return std::filesystem::exists(folder / name, code); };
+  const auto is = [&](const char* name) { return fs::exists(folder / name, code); };
   if (is("rgb.txt") || !is("color.txt")) return {};
   return {"color.txt", is("aligned_depth.txt") ? "aligned_depth.txt" : "depth.txt"};
 }
 
-LayoutCalibration ReadTumCalibration(const std::filesystem::path& folder) {
+LayoutCalibration ReadTumCalibration(const fs::path& folder) {
   std::error_code code;
   LayoutCalibration out;
-  const std::filesystem::path eth3d = folder / "calibration.txt";
+  const fs::path eth3d = folder / "calibration.txt";
   if (std::string(TumListsOf(folder).colour) == "color.txt") {
     out = ReadLoris(folder);
     out.depth_units_per_m = 1000;
-  } else if (std::filesystem::is_regular_file(eth3d, code)) {  // https://www.eth3d.net/slam_documentation
+  } else if (fs::is_regular_file(eth3d, code)) {  // https://www.eth3d.net/slam_documentation
     out.rig.left = ReadIntrinsics(eth3d);
     out.source = "calibration.txt";
     out.depth_units_per_m = 5000;
@@ -234,17 +223,16 @@ std::vector<int> AssociateStamps(const std::vector<double>& a, const std::vector
   return match;
 }
 
-FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options) {
-  if (options.sensor == Sensor::kStereo) {
+FolderContents FindTum(const fs::path& folder, const DatasetOptions& options) {
+  if (options.sensor == Sensor::kStereo)
     throw InputError(folder.string() + ": the TUM layout has no stereo pairs; set sensor to rgbd or mono");
-  }
   FolderContents out;
   out.folder = folder;
   std::error_code code;
   const TumLists names = TumListsOf(folder);
-  const bool lists = std::filesystem::exists(folder / names.colour, code);
-  const bool depth_list = std::filesystem::exists(folder / names.depth, code);
-  const bool associations = std::filesystem::exists(folder / "associations.txt", code);
+  const bool lists = fs::exists(folder / names.colour, code);
+  const bool depth_list = fs::exists(folder / names.depth, code);
+  const bool associations = fs::exists(folder / "associations.txt", code);
   if (options.sensor == Sensor::kRgbd ? associations : !lists) {
     FromAssociations(folder, options, out);
   } else if (options.sensor == Sensor::kRgbd && !(lists && depth_list)) {
@@ -255,19 +243,15 @@ FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions
     FromLists(folder, names, options, out);
   }
   const LayoutCalibration own = ReadTumCalibration(folder);
-  if (!options.camera && !own.rig.left) {
+  if (!options.camera && !own.rig.left)
     throw InputError(folder.string() +
                      ": the TUM layout holds no calibration; set fx, fy, cx, cy under 'camera:' in the "
                      "configuration (tum_fr1_rgbd and its like, which are part of tutti, have them)");
-  }
-  out.left = options.camera ? options.camera : own.rig.left;
-  out.T_body_left = own.rig.T_body_left;
+  out.rig.left = options.camera ? options.camera : own.rig.left;
+  out.rig.T_body_left = own.rig.T_body_left;
   out.depth.units_per_m = own.depth_units_per_m;
   out.rate_hz = 30.0;
-  if (out.frames.size() > 1) {
-    out.rate_hz =
-        static_cast<double>(out.frames.size() - 1) / (out.frames.back().stamp_s - out.frames.front().stamp_s);
-  }
+  out.MeasureRate();
   out.truth_places = {folder / "groundtruth.txt", folder / "poses.txt"};
   for (int i = 0; i < 4; ++i) {  // ICL-NUIM's names
     out.truth_places.push_back(folder / ("livingRoom" + std::to_string(i) + ".gt.freiburg"));

@@ -1,15 +1,12 @@
 // A video file. Decoders are sequential, so random access is emulated: frames that a reader thread skips over
 // are kept for a while for its neighbours, and going far back starts from the beginning.
 #include <algorithm>
-#include <functional>
-#include <map>
 #include <mutex>
 #include <set>
 
 #include "core/text_reader.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/video_decoder.h"
-#include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -29,8 +26,7 @@ void DropRepeated(const std::string& name, VideoTimes& times) {
   times.ticks.erase(std::unique(times.ticks.begin(), times.ticks.end()), times.ticks.end());
   const std::size_t skipped = all - times.ticks.size();
   if (skipped == 0) return;
-  times.notes.push_back(name + ": " + std::to_string(skipped) + " of " + std::to_string(all) +
-                        " frames repeat a time stamp and are skipped");
+  times.notes.push_back(name + ": " + PartText(skipped, all) + " frames repeat a time stamp and are skipped");
   times.skipped_share = static_cast<double>(skipped) / static_cast<double>(all);
 }
 
@@ -113,7 +109,7 @@ class VideoFrames {
   }
 
  private:
-  // Of the frame that was grabbed last; nothing: the container does not list it.
+  // The frame is that which was grabbed last; nothing: the container does not list it.
   std::optional<std::size_t> NumberOf(const std::vector<std::int64_t>& ticks) const {
     const std::optional<std::int64_t> here = video_->Ticks();
     if (ticks.empty() || !here) return next_;
@@ -144,18 +140,20 @@ class VideoFrames {
   mutable std::map<std::size_t, cv::Mat> kept_;
 };
 
-class VideoDataset : public Dataset {
+class VideoDataset : public RecordedDataset {
  public:
   VideoDataset(const std::filesystem::path& file, const DatasetOptions& options)
-      : file_(file), grey_(file_, Pixels::kGrey, 48), colour_(file_, Pixels::kColour, 2) {
-    VideoDecoder video(file_);
+      : RecordedDataset(file.string(), options),
+        grey_(name_, Pixels::kGrey, 48),
+        colour_(name_, Pixels::kColour, 2) {
+    VideoDecoder video(name_);
     const cv::Mat first = video.Grab() ? video.Retrieve(Pixels::kGrey) : cv::Mat();
-    if (first.empty()) throw InputError(file_ + ": no frame can be decoded; is it a complete video file?");
+    if (first.empty()) throw InputError(name_ + ": no frame can be decoded; is it a complete video file?");
     size_ = first.size();
     const double stated_hz = options.rate_hz > 0  ? options.rate_hz
                              : video.RateHz() > 0 ? video.RateHz()
                                                   : 30.0;
-    VideoTimes times = TimesOf(file_, video.Ticks(), stated_hz);
+    VideoTimes times = TimesOf(name_, video.Ticks(), stated_hz);
     ticks_ = std::move(times.ticks);
     stamps_s_ = std::move(times.stamps_s);
     warnings_ = std::move(times.notes);
@@ -165,19 +163,14 @@ class VideoDataset : public Dataset {
         stamps_s_[i] = static_cast<double>(i) / options.rate_hz;
     }
     turned_by_ = video.TurnedBy();
-    DatasetOptions use = options;
-    use.camera = CameraOfVideo(file_, video, options, size_, warnings_);
-    rig_ = RectifyRig(file_, use, size_, stated_hz, warnings_);
-    mask_ = MaskOfAll(options, size_, rig_.left);
+    options_.camera = CameraOfVideo(name_, video, options, size_, warnings_);
+    SetUpRig(stated_hz);
   }
 
   std::size_t Size() const override { return stamps_s_.size(); }
   double Stamp(std::size_t i) const override { return stamps_s_.at(i); }
   double SkippedShare() const override { return skipped_share_; }
-  const CameraRig& Rig() const override { return rig_.rig; }
   int TurnedBy() const override { return turned_by_; }
-  std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
-  const std::vector<std::string>& Warnings() const override { return warnings_; }
 
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override {
@@ -192,7 +185,7 @@ class VideoDataset : public Dataset {
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
     InputFrame frame;
-    result.error = Rectified(grey_, i, frame.image);
+    result.error = Fetch(grey_, i, frame.image);
     if (!result.error.empty()) return result;
     frame.index = static_cast<std::int64_t>(i);
     frame.stamp_s = Stamp(i);
@@ -203,31 +196,25 @@ class VideoDataset : public Dataset {
 
   ColourImage ReadColour(std::size_t i) const override {
     ColourImage result;
-    result.error = Rectified(colour_, i, result.image);
+    result.error = Fetch(colour_, i, result.image);
     return result;
   }
 
  private:
   // What is wrong with frame i; else `out` gets it.
-  std::string Rectified(const VideoFrames& frames, std::size_t i, cv::Mat& out) const {
+  std::string Fetch(const VideoFrames& frames, std::size_t i, cv::Mat& out) const {
     const cv::Mat image = i < Size() ? frames.Fetch(i, ticks_) : cv::Mat();
-    if (image.empty()) return file_ + ": frame " + std::to_string(i) + " can't be decoded";
-    if (image.size() != size_)
-      return file_ + ": frame " + std::to_string(i) + " has another size than the first";
-    out = rig_.left ? rig_.left->Apply(image) : image;
+    if (image.empty()) return About(i) + " can't be decoded";
+    if (image.size() != size_) return About(i) + " has another size than the first";
+    out = Rectified(rig_.left, image);
     return {};
   }
 
-  std::string file_;
   VideoFrames grey_, colour_;
-  RectifiedRig rig_;
-  std::vector<std::string> warnings_;
   std::vector<std::int64_t> ticks_;  // of the frames, as VideoTimes has them
   std::vector<double> stamps_s_;
-  cv::Size size_;
   int turned_by_ = 0;
   double skipped_share_ = 0;
-  cv::Mat mask_;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/rectified_rig.h"
 
 namespace tutti {
 namespace {
@@ -26,12 +27,6 @@ std::vector<int> PixelsOfDepth(int count, double f, double c, double f_depth, do
 double DepthUnits(const DatasetOptions& options, double of_layout) {
   if (options.depth_units_per_m > 0) return options.depth_units_per_m;
   return of_layout > 0 ? of_layout : kTumUnits;
-}
-
-double DepthReader::UnitsOf(const cv::Mat& stored) const {
-  if (units_ > 0) return units_;
-  if (stored.depth() == CV_32F) return 1;
-  return format_.units_per_m > 0 ? format_.units_per_m : kTumUnits;
 }
 
 // To the images' size, if it is known how.
@@ -63,24 +58,25 @@ bool DepthReader::Resample(cv::Mat& depth) const {
   return true;
 }
 
-std::string DepthReader::Read(const std::filesystem::path& file, const Rectifier* rectifier,
+std::string DepthReader::Read(const std::filesystem::path& file, const std::optional<Rectifier>& rectifier,
                               cv::Mat& metres) const {
   const ImageFile read = ReadDepthFile(file, format_.float_in_png);
   if (!read.error.empty()) return read.error;
-  cv::Mat depth = DepthInMetres(read.image, UnitsOf(read.image), max_depth_m_);
+  const bool metres_as_stored = options_.depth_units_per_m <= 0 && read.image.depth() == CV_32F;
+  const double units = metres_as_stored ? 1 : DepthUnits(options_, format_.units_per_m);
+  cv::Mat depth = DepthInMetres(read.image, units, options_.max_depth_m);
   constexpr double kMillimetres = 1000;  // 65.535 m is what a Kinect's driver writes for "none"
   if (read.image.type() == CV_16UC1 && format_.units_per_m == kMillimetres)
     depth.setTo(0, read.image == std::numeric_limits<unsigned short>::max());
-  if (depth.size() != size_ && !Resample(depth)) {
+  if (depth.size() != size_ && !Resample(depth))
     return file.string() + ": the depth image has " + SizeText(depth.size()) +
            " pixels, but the colour images have " + SizeText(size_) + "; depth must be registered to colour";
-  }
-  metres = rectifier != nullptr ? rectifier->Apply(depth, Sampling::kNearest) : depth;
+  metres = Rectified(rectifier, depth, Sampling::kNearest);
   return {};
 }
 
 std::vector<std::string> DepthReader::Notes(const std::filesystem::path& first) const {
-  if (units_ > 0 || format_.units_per_m > 0) return {};
+  if (options_.depth_units_per_m > 0 || format_.units_per_m > 0) return {};
   const ImageFile read = ReadDepthFile(first);
   if (read.image.depth() == CV_32F) return {};
   std::string middle;

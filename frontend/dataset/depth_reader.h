@@ -31,23 +31,18 @@ class DepthReader {
   /// `colour`: the images' camera as calibrated, if known; `size`: of the images, as they are stored.
   DepthReader(const DatasetOptions& options, const DepthFormat& format,
               const std::optional<PinholeCamera>& colour, cv::Size size)
-      : units_(options.depth_units_per_m),
-        max_depth_m_(options.max_depth_m),
-        format_(format),
-        colour_(colour),
-        size_(size) {}
+      : options_(options), format_(format), colour_(colour), size_(size) {}
 
   /// Empty, and `metres` of the images' size (0: no measurement, CV_32FC1); or what is wrong with the file.
-  std::string Read(const std::filesystem::path& file, const Rectifier* rectifier, cv::Mat& metres) const;
+  std::string Read(const std::filesystem::path& file, const std::optional<Rectifier>& rectifier,
+                   cv::Mat& metres) const;
   /// What is to be said where nothing says the unit; `first`: a depth image.
   std::vector<std::string> Notes(const std::filesystem::path& first) const;
 
  private:
-  double UnitsOf(const cv::Mat& stored) const;
   bool Resample(cv::Mat& depth) const;
 
-  double units_;  // 0: not said
-  double max_depth_m_;
+  DatasetOptions options_;
   DepthFormat format_;
   std::optional<PinholeCamera> colour_;
   cv::Size size_;

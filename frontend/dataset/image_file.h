@@ -31,14 +31,26 @@ constexpr std::int64_t kMostImageBytes = 1000000000;    // of the file
 /// Reads an image in grey, 8 or 16 bit as stored. Decoders fill the missing part of a truncated JPEG, PNG or
 /// WebP with grey without a word, so the ends of these are checked first. Never throws; thread-safe.
 ImageFile ReadGreyFile(const std::filesystem::path& file);
-/// The same in colour, 3 channels, blue first.
+/// Gives 3 channels, blue first.
 ImageFile ReadColourFile(const std::filesystem::path& file);
-/// The same as cv::imread with these flags gives it.
+/// Gives what cv::imread does with these flags.
 ImageFile ReadImageFile(const std::filesystem::path& file, int flags);
-/// The same of the bytes of such a file.
+/// Decodes the bytes of such a file; messages do not name it.
 ImageFile DecodeImage(const std::vector<unsigned char>& bytes, int flags);
-/// Reads a depth image as stored: one channel of 16 bit or float, of an image file or NumPy's (.npy: two
-/// dimensions, of float16, float32, float64 or uint16). `float_in_png`: 4 channels of 8 bit are a float.
+/// NumPy's array (.npy), a depth image: of two dimensions (or three, of which one is 1) in C order. float16,
+/// float32 and float64 become CV_32FC1, uint16 CV_16UC1.
+ImageFile DecodeNpy(const std::vector<unsigned char>& bytes);
+
+/// How large an image says it is, without decoding it.
+struct ClaimedSize {
+  std::uint64_t width = 0, height = 0;  ///< [px]
+};
+/// From the header of PNG, JPEG, BMP, PNM, TIFF, WebP (extended) and JPEG 2000; nothing of other bytes, or
+/// where the header is cut off.
+std::optional<ClaimedSize> SizeInHeader(const std::vector<unsigned char>& bytes);
+
+/// Reads a depth image as stored: one channel of 16 bit or float, of an image file or NumPy's.
+/// `float_in_png`: 4 channels of 8 bit are a float.
 ImageFile ReadDepthFile(const std::filesystem::path& file, bool float_in_png = false);
 
 /// Writes an image as a PNG file, as cv::imwrite does with these parameters. Throws InputError.
@@ -54,9 +66,9 @@ struct GreyRange {
   bool narrow = false;  ///< a small part of what `bits` can say, and stretched
   int bits = 8;         ///< significant ones of the images
 };
-/// Of the first images of a recording. All that their bits can say, unless they use an eighth of it or less,
-/// as those of thermal cameras do: then from the darkest to the brightest, with a margin of half of that on
-/// each side.
+/// The range of the first images of a recording: all that their bits can say, unless they use an eighth of it
+/// or less, as those of thermal cameras do: then from the darkest to the brightest, with a margin of half of
+/// that on each side.
 GreyRange RangeOf(const std::vector<cv::Mat>& greys);
 /// "16-bit images, taken as 14-bit and scaled to 8 bit".
 std::string RangeText(const GreyRange& range);

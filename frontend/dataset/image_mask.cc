@@ -1,6 +1,7 @@
 #include "frontend/dataset/image_mask.h"
 
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/rectified_rig.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -60,6 +61,11 @@ cv::Mat ImageMasks::OfAll(cv::Size size) const {
         "for all, or take the frames out into a folder of images");
   CheckSize(path_, single_, size);
   return single_;
+}
+
+cv::Mat MaskOfAll(const DatasetOptions& options, cv::Size size, const std::optional<Rectifier>& rectifier) {
+  if (options.mask.empty()) return {};
+  return Rectified(rectifier, ImageMasks(options.mask).OfAll(size), Sampling::kNearest);
 }
 
 }  // namespace tutti

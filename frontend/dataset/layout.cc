@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "frontend/dataset/image_file.h"
@@ -14,96 +15,73 @@ namespace {
 
 namespace fs = std::filesystem;
 
-PinholeCamera PublishedCamera(int width, int height, double f, double cx, double cy) {
-  PinholeCamera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = camera.fy = f;
-  camera.cx = cx;
-  camera.cy = cy;
-  return camera;
-}
+using AddLayout = std::function<Layout&(const char* name, ImageRole left, ImageRole right, ImageRole depth,
+                                        const char* sign)>;
 
-std::vector<Layout> MakeLayouts() {
-  std::vector<Layout> all;
-  const auto add = [&all](const char* name, ImageRole left, ImageRole right, ImageRole depth) -> Layout& {
-    all.push_back({name, left, right, depth});
-    return all.back();
-  };
-  // The data sets' own pages and tools are the source of units, cameras and conventions.
-  const auto kitti = [&](const char* left, const char* right, const char* stamps) {
-    Layout& raw = add("KITTI raw", {left}, {right}, {});
-    raw.sign =
-        "image_00/timestamps.txt|image_02/timestamps.txt|oxts|../calib_cam_to_cam.txt|calib_cam_to_cam.txt";
+// The data sets' own pages and tools are the source of units, cameras and conventions.
+void AddPublished(const AddLayout& add) {
+  for (const auto& [left, right, stamps] :
+       {std::array{"image_00/data", "image_01/data", "image_00/timestamps.txt"},
+        {"image_02/data", "image_03/data", "image_02/timestamps.txt"}}) {
+    Layout& raw = add(
+        "KITTI raw", {left}, {right}, {},
+        "image_00/timestamps.txt|image_02/timestamps.txt|oxts|../calib_cam_to_cam.txt|calib_cam_to_cam.txt");
     raw.stamps = stamps;
     raw.rate_hz = 10;
-    raw.truth = "oxts/data";
-    raw.form = TruthForm::kOxts;
-  };
-  kitti("image_00/data", "image_01/data", "image_00/timestamps.txt");
-  kitti("image_02/data", "image_03/data", "image_02/timestamps.txt");
-  const auto tartan = [&](const char* name, ImageRole left, ImageRole right, ImageRole depth) -> Layout& {
-    Layout& air = add(name, left, right, depth);
+    raw.truth = {TruthForm::kOxts, "oxts/data"};
+  }
+  const auto tartan = [](Layout& air, int height, const char* truth) -> Layout& {
     air.baseline_m = 0.25;
     air.depth_units_per_m = 1;
-    air.form = TruthForm::kLines;
+    air.published = Pinhole(320, 320, 320, height / 2, {640, height});
+    air.truth = {TruthForm::kLines, truth};
     air.forward_right_down = true;
     return air;
   };
-  Layout& first = tartan("TartanAir", {"image_left"}, {"image_right"}, {"depth_left"});
-  first.sign = "pose_left.txt|depth_left";
-  first.published = PublishedCamera(640, 480, 320, 320, 240);
-  first.truth = "pose_left.txt";
-  Layout& second = tartan("TartanAir V2", {"image_lcam_front"}, {"image_rcam_front"}, {"depth_lcam_front"});
-  second.published = PublishedCamera(640, 640, 320, 320, 320);
-  second.truth = "pose_lcam_front.txt";
-  second.float_in_png = true;
+  tartan(add("TartanAir", {"image_left"}, {"image_right"}, {"depth_left"}, "pose_left.txt|depth_left"), 480,
+         "pose_left.txt");
+  tartan(add("TartanAir V2", {"image_lcam_front"}, {"image_rcam_front"}, {"depth_lcam_front"}, ""), 640,
+         "pose_lcam_front.txt")
+      .float_in_png = true;
 
-  Layout& scannet = add("ScanNet", {"color"}, {}, {"depth"});
-  scannet.sign = "pose";
+  const auto rgbd = [](Layout& layout, double units_per_m, double rate_hz, TruthPlace truth) -> Layout& {
+    layout.depth_units_per_m = units_per_m;
+    layout.rate_hz = rate_hz;
+    layout.truth = truth;
+    return layout;
+  };
+  Layout& scannet =
+      rgbd(add("ScanNet", {"color"}, {}, {"depth"}, "pose"), 1000, 30, {TruthForm::kFiles, "pose"});
   scannet.intrinsics = "intrinsic/intrinsic_color.txt";
   scannet.depth_intrinsics = "intrinsic/intrinsic_depth.txt";
-  scannet.depth_units_per_m = 1000;
-  scannet.rate_hz = 30;
-  scannet.truth = "pose";
-  scannet.form = TruthForm::kFiles;
-  Layout& scenes = add("7-Scenes", {"", "frame-*.color"}, {}, {"", "frame-*.depth"});
-  scenes.depth_units_per_m = 1000;
-  scenes.rate_hz = 30;
-  scenes.truth_word = "frame-*.pose";
-  scenes.form = TruthForm::kFiles;
-  scenes.pairs = true;
-  const auto replica = [&](const char* images, const char* above, const char* calibration) {
-    Layout& r = add("Replica", {images, "frame"}, {}, {images, "depth"});
-    r.sign = above;
-    r.calibration = calibration;
-    r.published = PublishedCamera(1200, 680, 600, 599.5, 339.5);
-    r.depth_units_per_m = 6553.5;
-    r.rate_hz = 30;
-    r.truth = above;
-    r.form = TruthForm::kLines;
-    r.pairs = true;
-  };
-  replica("results", "traj.txt", "cam_params.json|../cam_params.json");
-  replica("", "../traj.txt", "../cam_params.json|../../cam_params.json");
-  for (const char* colour : {"color", "image", "rgb"}) {
-    Layout& open3d = add("Open3D", {colour}, {}, {"depth"});
-    open3d.sign = "camera_intrinsic.json|intrinsic.json|camera_primesense.json|camera.json|trajectory.log";
-    open3d.calibration = "camera_intrinsic.json|intrinsic.json|camera_primesense.json|camera.json";
-    open3d.depth_units_per_m = 1000;
-    open3d.rate_hz = 30;
-    open3d.truth = "trajectory.log";
-    open3d.form = TruthForm::kLog;
+  rgbd(add("7-Scenes", {"", "frame-*.color"}, {}, {"", "frame-*.depth"}, ""), 1000, 30,
+       {TruthForm::kFiles, "", "frame-*.pose"})
+      .pairs = true;
+  for (const auto& [images, truth, calibration] :
+       {std::array{"results", "traj.txt", "cam_params.json|../cam_params.json"},
+        {"", "../traj.txt", "../cam_params.json|../../cam_params.json"}}) {
+    Layout& replica = rgbd(add("Replica", {images, "frame"}, {}, {images, "depth"}, truth), 6553.5, 30,
+                           {TruthForm::kLines, truth});
+    replica.calibration = calibration;
+    replica.published = Pinhole(600, 600, 599.5, 339.5, {1200, 680});
+    replica.pairs = true;
   }
+  for (const char* colour : {"color", "image", "rgb"})
+    rgbd(add("Open3D", {colour}, {}, {"depth"},
+             "camera_intrinsic.json|intrinsic.json|camera_primesense.json|camera.json|trajectory.log"),
+         1000, 30, {TruthForm::kLog, "trajectory.log"})
+        .calibration = "camera_intrinsic.json|intrinsic.json|camera_primesense.json|camera.json";
   // Images that a program took out of Stray Scanner's video.
-  Layout& stray = add("Stray Scanner", {"rgb"}, {}, {"depth"});
-  stray.sign = "odometry.csv";
-  stray.intrinsics = "camera_matrix.csv";
-  stray.depth_units_per_m = 1000;
-  stray.truth = "odometry.csv";
-  stray.form = TruthForm::kOdometry;
+  rgbd(add("Stray Scanner", {"rgb"}, {}, {"depth"}, "odometry.csv"), 1000, 0,
+       {TruthForm::kOdometry, "odometry.csv"})
+      .intrinsics = "camera_matrix.csv";
+}
 
-  // Nobody's in particular.
+// Layouts of nobody in particular.
+void AddAnonymous(const AddLayout& to) {
+  const auto add = [&to](ImageRole left, ImageRole right, ImageRole depth) -> Layout& {
+    return to("", left, right, depth, "");
+  };
   for (const auto& [left, right] : {std::pair("cam0", "cam1"),
                                     {"left", "right"},
                                     {"image_left", "image_right"},
@@ -112,17 +90,25 @@ std::vector<Layout> MakeLayouts() {
                                     {"infra1", "infra2"},
                                     {"l", "r"},
                                     {"L", "R"}})
-    add("", {left}, {right}, {"depth"});
-  for (const char* colour : {"rgb", "color", "colour", "image", "images"}) add("", {colour}, {}, {"depth"});
+    add({left}, {right}, {"depth"});
+  for (const char* colour : {"rgb", "color", "colour", "image", "images"}) add({colour}, {}, {"depth"});
   for (const auto& [left, right] : {std::pair("left", "right"), {"cam0", "cam1"}, {"l", "r"}})
-    add("", {"", left}, {"", right}, {}).pairs = true;
+    add({"", left}, {"", right}, {}).pairs = true;
   for (const char* colour : {"color", "colour", "rgb", "frame", "!depth"})
-    add("", {"", colour}, {}, {"", "depth"}).pairs = true;
-  return all;
+    add({"", colour}, {}, {"", "depth"}).pairs = true;
 }
 
 const std::vector<Layout>& Layouts() {
-  static const std::vector<Layout> layouts = MakeLayouts();
+  static const std::vector<Layout> layouts = [] {
+    std::vector<Layout> all;
+    const AddLayout add = [&all](const char* name, ImageRole left, ImageRole right, ImageRole depth,
+                                 const char* sign) -> Layout& {
+      return all.emplace_back(Layout{name, left, right, depth, sign});
+    };
+    AddPublished(add);
+    AddAnonymous(add);
+    return all;
+  }();
   return layouts;
 }
 
@@ -166,16 +152,11 @@ std::optional<std::string> WithoutWord(const std::string& name, const std::strin
 // "frame-000012" -> "12", "00012-000000000400" -> "12 400".
 std::string NumbersIn(const std::string& name) {
   std::string key;
-  for (std::size_t i = 0; i < name.size();) {
-    if (!IsDigit(name[i])) {
-      ++i;
-      continue;
-    }
-    std::size_t end = i;
-    while (end < name.size() && IsDigit(name[end])) ++end;
+  for (std::size_t i = 0, end = 0; i < name.size(); i = std::max(i + 1, end)) {
+    for (end = i; end < name.size() && IsDigit(name[end]);) ++end;
+    if (end == i) continue;
     while (i + 1 < end && name[i] == '0') ++i;
     key += (key.empty() ? "" : " ") + name.substr(i, end - i);
-    i = end;
   }
   return key;
 }
@@ -187,12 +168,6 @@ std::optional<fs::path> OneOf(const fs::path& folder, const std::string& names) 
     if (fs::exists(folder / name, ignored)) return folder / name;
   }
   return std::nullopt;
-}
-
-// Pictures made of depth are none.
-bool IsDepth(const Layout& layout, const fs::path& file) {
-  if (*layout.name != '\0') return true;
-  return ReadDepthFile(file).error.empty();
 }
 
 bool IsImageOrArray(const fs::path& file) { return HasImageExtension(file) || file.extension() == ".npy"; }
@@ -247,7 +222,8 @@ std::optional<FoundLayout> Match(const fs::path& folder, const Layout& layout, c
   if (layout.right.folder != nullptr) found.right = 2 * images(layout.right).size() > left.size();
   if (layout.depth.folder != nullptr) {
     const auto depth = images(layout.depth);
-    found.depth = !depth.empty() && IsDepth(layout, depth.front().file);
+    // Pictures made of depth are none.
+    found.depth = !depth.empty() && (!anonymous || ReadDepthFile(depth.front().file).error.empty());
     // Names without the word may be of anything; those with it say what they are.
     if (inside && 2 * left.size() < depth.size()) return std::nullopt;
     if (layout.pairs && !depth.empty()) return found;
@@ -261,15 +237,14 @@ void DropStrayTypes(const fs::path& folder, std::vector<fs::path>& files, std::v
   std::map<std::string, std::size_t> counts;
   for (const fs::path& file : files) ++counts[file.extension().string()];
   const std::size_t all = files.size();
-  for (const auto& [extension, count] : counts) {
-    if (10 * count >= all) continue;
-    const std::string& type = extension;
+  for (const auto& count : counts) {
+    if (10 * count.second >= all) continue;
     files.erase(std::remove_if(files.begin(), files.end(),
-                               [&](const fs::path& f) { return f.extension().string() == type; }),
+                               [&](const fs::path& f) { return f.extension().string() == count.first; }),
                 files.end());
     if (notes == nullptr) continue;
-    notes->push_back(folder.string() + ": " + std::to_string(count) + " " + type + " image(s) among " +
-                     std::to_string(all) + " images of other types are left out");
+    notes->push_back(folder.string() + ": " + std::to_string(count.second) + " " + count.first +
+                     " image(s) among " + std::to_string(all) + " images of other types are left out");
   }
 }
 
@@ -317,11 +292,10 @@ bool HasStamps(const fs::path& folder) {
 
 std::vector<RoleImage> ImagesOf(const fs::path& folder, const ImageRole& role, const std::string& extension) {
   if (role.folder == nullptr) return {};
-  return Select(ListFiles(*role.folder == '\0' ? folder : folder / role.folder,
-                          [&](const fs::path& file) {
-                            return extension.empty() ? IsImageOrArray(file) : file.extension() == extension;
-                          }),
-                role);
+  const auto wanted = [&](const fs::path& file) {
+    return extension.empty() ? IsImageOrArray(file) : file.extension() == extension;
+  };
+  return Select(ListFiles(*role.folder == '\0' ? folder : folder / role.folder, wanted), role);
 }
 
 std::vector<fs::path> FramesIn(const fs::path& folder, bool pairs, std::vector<std::string>* notes) {

@@ -31,6 +31,13 @@ enum class TruthForm {
   kOdometry  ///< Stray Scanner: stamp, frame, x, y, z, qx, qy, qz, qw
 };
 
+/// Where a layout has its ground truth.
+struct TruthPlace {
+  TruthForm form = TruthForm::kNone;
+  const char* name = "";  ///< file or folder; "": the data set's folder itself
+  const char* word = "";  ///< kFiles: of the names, as ImageRole::word
+};
+
 struct Layout {
   const char* name;  ///< empty: nobody's in particular
   ImageRole left, right, depth;
@@ -44,9 +51,7 @@ struct Layout {
   double baseline_m = 0;
   double depth_units_per_m = 0;  ///< 0: not known
   double rate_hz = 0;            ///< 0: not known
-  const char* truth = "";        ///< file or folder; "": the data set's folder itself
-  const char* truth_word = "";   ///< kFiles: of the names, as ImageRole::word
-  TruthForm form = TruthForm::kNone;
+  TruthPlace truth{};
   bool float_in_png = false;        ///< depth: the four bytes of a pixel are a float
   bool forward_right_down = false;  ///< the ground truth's camera looks along x, y to the right
 };
@@ -97,17 +102,28 @@ struct LayoutCalibration {
 /// `size`: of the images. Throws InputError.
 LayoutCalibration ReadLayoutCalibration(const std::filesystem::path& folder, const FoundLayout& found,
                                         cv::Size size);
-/// The same of KITTI raw.
 LayoutCalibration ReadKittiRawCalibration(const std::filesystem::path& folder, const FoundLayout& found,
                                           cv::Size size);
+
 /// Lists of TUM's layout.
 struct TumLists {
   const char* colour = "rgb.txt";
   const char* depth = "depth.txt";  ///< OpenLORIS: registered depth has a list of its own
 };
 TumLists TumListsOf(const std::filesystem::path& folder);
-/// Of data sets in TUM's layout that have a calibration: OpenLORIS (sensors.yaml), ETH3D (calibration.txt).
+/// Reads the calibration that data sets in TUM's layout may have: OpenLORIS (sensors.yaml), ETH3D
+/// (calibration.txt).
 LayoutCalibration ReadTumCalibration(const std::filesystem::path& folder);
+
+/// One camera of an ASL data set.
+struct SensorYaml {
+  PinholeCamera camera;
+  std::optional<Pose> T_body_sensor;  ///< T_BS, where the file has it
+  std::optional<double> rate_hz;
+};
+/// EuRoC's sensor.yaml. Throws InputError that names file and line for a missing file or key, a wrong number
+/// of values, an unknown model.
+SensorYaml ReadSensorYaml(const std::filesystem::path& file);
 
 /// What a layout says of its depth images, but for their camera.
 DepthFormat FormatOfDepth(const Layout& layout);

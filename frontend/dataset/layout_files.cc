@@ -145,8 +145,7 @@ Trajectory ReadOxts(const LayoutTruth& truth) {
   Trajectory out;
   double scale = 0;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  const auto files = ImagesOf(truth.place, {"", ""}, ".txt");
-  for (const RoleImage& file : files) {
+  for (const RoleImage& file : ImagesOf(truth.place, {"", ""}, ".txt")) {
     const auto stamp = stamps.find(file.key);
     const std::optional<long long> number = ParseInteger(file.key);
     const bool listed = number && *number >= 0 && static_cast<std::size_t>(*number) < own.size();
@@ -199,13 +198,6 @@ Trajectory ReadOdometry(const LayoutTruth& truth, std::vector<std::string>* warn
   return out;
 }
 
-// Looks along x with y to the right and z down (NED): forward, right, down of a camera are z, x, y.
-Pose ForwardRightDown() {
-  Eigen::Matrix3d R;
-  R << 0, 0, 1, 1, 0, 0, 0, 1, 0;
-  return Pose(Eigen::Quaterniond(R), Eigen::Vector3d::Zero());
-}
-
 // Calibrated for about this size: the principal point is near the middle.
 bool Fits(const PinholeCamera& camera, cv::Size size) {
   return std::abs(2 * camera.cx / size.width - 1) < 0.2 && std::abs(2 * camera.cy / size.height - 1) < 0.2;
@@ -215,16 +207,12 @@ bool Fits(const PinholeCamera& camera, cv::Size size) {
 
 PinholeCamera ReadIntrinsics(const fs::path& file) {
   const std::vector<double> v = Numbers(file);
-  PinholeCamera camera;
   const std::size_t row = v.size() == 9 ? 3 : 4;
-  if (v.size() == 4) {
-    camera.fx = v[0], camera.fy = v[1], camera.cx = v[2], camera.cy = v[3];
-  } else if (v.size() == 9 || v.size() == 12 || v.size() == 16) {
-    camera.fx = v[0], camera.fy = v[row + 1], camera.cx = v[2], camera.cy = v[row + 2];
-  } else {
+  if (v.size() != 4 && v.size() != 9 && v.size() != 12 && v.size() != 16)
     throw InputError(file.string() + ": has " + std::to_string(v.size()) +
                      " numbers; intrinsics are 4 (fx fy cx cy) or a matrix of 3x3, 3x4 or 4x4");
-  }
+  const PinholeCamera camera =
+      v.size() == 4 ? Pinhole(v[0], v[1], v[2], v[3]) : Pinhole(v[0], v[row + 1], v[2], v[row + 2]);
   if (!(camera.fx > 0 && camera.fy > 0) || !std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy))
     throw InputError(file.string() + ": the focal lengths must be positive");
   return camera;
@@ -232,10 +220,14 @@ PinholeCamera ReadIntrinsics(const fs::path& file) {
 
 LayoutCalibration ReadLayoutCalibration(const fs::path& folder, const FoundLayout& found, cv::Size size) {
   const Layout& layout = *found.layout;
-  if (layout.form == TruthForm::kOxts) return ReadKittiRawCalibration(folder, found, size);
+  if (layout.truth.form == TruthForm::kOxts) return ReadKittiRawCalibration(folder, found, size);
   LayoutCalibration out;
   std::error_code ignored;
-  if (layout.forward_right_down) out.rig.T_body_left = ForwardRightDown();
+  if (layout.forward_right_down) {  // NED: forward, right, down of a camera are z, x, y
+    Eigen::Matrix3d R;
+    R << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+    out.rig.T_body_left = Pose(Eigen::Quaterniond(R), Eigen::Vector3d::Zero());
+  }
   const fs::path intrinsics = folder / layout.intrinsics, of_depth = folder / layout.depth_intrinsics;
   if (*layout.depth_intrinsics != '\0' && fs::is_regular_file(of_depth, ignored))
     out.depth = ReadIntrinsics(of_depth);
@@ -293,25 +285,11 @@ bool HoldsTruth(const LayoutTruth& truth) {
 Trajectory ReadLayoutTruth(const LayoutTruth& truth, std::vector<std::string>* warnings) {
   Trajectory out;
   Poses lines;
-  switch (truth.form) {
-    case TruthForm::kNone:
-      break;
-    case TruthForm::kFiles:
-      out = ReadPoseFiles(truth);
-      break;
-    case TruthForm::kOxts:
-      out = ReadOxts(truth);
-      break;
-    case TruthForm::kOdometry:
-      out = ReadOdometry(truth, warnings);
-      break;
-    case TruthForm::kLines:
-      lines = ReadLines(truth.place);
-      break;
-    case TruthForm::kLog:
-      lines = ReadLog(truth.place);
-      break;
-  }
+  if (truth.form == TruthForm::kFiles) out = ReadPoseFiles(truth);
+  if (truth.form == TruthForm::kOxts) out = ReadOxts(truth);
+  if (truth.form == TruthForm::kOdometry) out = ReadOdometry(truth, warnings);
+  if (truth.form == TruthForm::kLines) lines = ReadLines(truth.place);
+  if (truth.form == TruthForm::kLog) lines = ReadLog(truth.place);
   if (!lines.empty() && lines.size() != truth.stamps.size())
     throw InputError(truth.place.string() + ": has " + std::to_string(lines.size()) +
                      " poses, but there are " + std::to_string(truth.stamps.size()) +

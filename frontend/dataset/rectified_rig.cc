@@ -17,10 +17,9 @@ PinholeCamera Fitting(const std::string& name, const char* which, PinholeCamera 
     camera.height = size.height;
   }
   const cv::Size calibrated(camera.width, camera.height);
-  if (calibrated != size) {
+  if (calibrated != size)
     throw InputError(name + ": the " + which + "camera is calibrated for images of " + SizeText(calibrated) +
                      ", but the images have " + SizeText(size) + "; use the calibration of this camera");
-  }
   const std::string problem = camera.Validate();
   if (!problem.empty()) throw InputError(name + ": " + which + problem);
   return camera;
@@ -31,12 +30,11 @@ void RectifyPairs(const std::string& name, const PinholeCamera& left, const RigC
   StereoRectification stereo =
       RectifyStereo(left, Fitting(name, "right ", *calibration.right, size), *calibration.T_right_left);
   if (options.right && options.baseline_m > 0 &&
-      std::abs(options.baseline_m - stereo.baseline_m) > 0.01 * stereo.baseline_m) {
+      std::abs(options.baseline_m - stereo.baseline_m) > 0.01 * stereo.baseline_m)
     throw InputError(name + ": camera.baseline_m is " + std::to_string(options.baseline_m) +
                      " m, but the cameras of camera.right.T_right_left lie " +
                      std::to_string(stereo.baseline_m) +
                      " m apart; leave baseline_m out, which is of rectified pairs");
-  }
   out.left = std::move(stereo.left);
   out.right = std::move(stereo.right);
   out.rig.baseline_m = stereo.baseline_m;
@@ -45,31 +43,24 @@ void RectifyPairs(const std::string& name, const PinholeCamera& left, const RigC
 
 void TakeRectifiedPairs(const std::string& name, const PinholeCamera& left, double baseline_m,
                         RectifiedRig& out) {
-  if (left.distortion != Distortion::kNone) {
+  if (left.distortion != Distortion::kNone)
     throw InputError(name +
                      ": stereo pairs must be rectified, but the camera has distortion; of raw pairs give the "
                      "right camera, "
                      "too (camera.right, or a sensor.yaml for each in the EuRoC layout), of rectified ones "
                      "set it to none");
-  }
-  if (!(baseline_m > 0)) {
+  if (!(baseline_m > 0))
     throw InputError(name +
                      ": the distance of the two cameras is not known; set camera.baseline_m [m], or add "
                      "calib.txt with P1 (KITTI), or give the right camera (camera.right) of raw pairs");
-  }
   out.rig.baseline_m = baseline_m;
 }
 
 }  // namespace
 
 PinholeCamera CameraOfView(double degrees, cv::Size size) {
-  PinholeCamera camera;
-  camera.width = size.width;
-  camera.height = size.height;
-  camera.fx = camera.fy = 0.5 * size.width / std::tan(0.5 * degrees / internal::kDegrees);
-  camera.cx = 0.5 * (size.width - 1);
-  camera.cy = 0.5 * (size.height - 1);
-  return camera;
+  const double f = 0.5 * size.width / std::tan(0.5 * degrees / internal::kDegrees);
+  return Pinhole(f, f, 0.5 * (size.width - 1), 0.5 * (size.height - 1), size);
 }
 
 RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, const DatasetOptions& options,
@@ -92,8 +83,7 @@ RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, con
                        ": camera.right is given, but not the left camera; set its fx, fy, cx and cy "
                        "under 'camera:', too");
     rig.calibrated = false;
-    rig.camera.width = size.width;
-    rig.camera.height = size.height;
+    rig.camera = Pinhole(0, 0, 0, 0, size);
     return out;
   }
   const PinholeCamera left = Fitting(name, "", *calibration.left, size);

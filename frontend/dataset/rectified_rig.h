@@ -26,6 +26,20 @@ struct RectifiedRig {
   std::optional<Rectifier> left, right;
 };
 
+/// A camera without distortion; without a size it has that of its images.
+inline PinholeCamera Pinhole(double fx, double fy, double cx, double cy, cv::Size size = {}) {
+  PinholeCamera camera;
+  camera.width = size.width, camera.height = size.height;
+  camera.fx = fx, camera.fy = fy, camera.cx = cx, camera.cy = cy;
+  return camera;
+}
+
+/// The image as the rectifier makes it, or as it is.
+inline cv::Mat Rectified(const std::optional<Rectifier>& rectifier, const cv::Mat& image,
+                         Sampling sampling = Sampling::kLinear) {
+  return rectifier ? rectifier->Apply(image, sampling) : image;
+}
+
 /// The camera with this horizontal field of view [deg]: square pixels, principal point in the middle.
 PinholeCamera CameraOfView(double degrees, cv::Size size);
 
@@ -41,7 +55,7 @@ inline std::string NoCalibrationText(const std::string& name) {
 RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, const DatasetOptions& options,
                         cv::Size size, double rate_hz);
 
-/// The same with what `options` say alone; adds NoCalibrationText to `warnings` where they have none.
+/// Uses what `options` say alone; adds NoCalibrationText to `warnings` where they have none.
 RectifiedRig RectifyRig(const std::string& name, const DatasetOptions& options, cv::Size size, double rate_hz,
                         std::vector<std::string>& warnings);
 

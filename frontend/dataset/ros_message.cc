@@ -1,14 +1,11 @@
 #include "frontend/dataset/ros_message.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <string_view>
 #include <vector>
 
 #include "core/byte_stream.h"

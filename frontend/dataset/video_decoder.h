@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "frontend/dataset/image_file.h"
+#include "tutti/frontend/dataset.h"
 
 namespace tutti {
 
@@ -54,6 +55,16 @@ class VideoDecoder {
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
+
+/// What the container of a video says of its camera: the orientation of its sensor and the shape of its
+/// pixels. `name` is what messages call the video, `size` that of its images, turned. Gives the camera of the
+/// options as it is for these images: one of a calibration that was made for the sensor's own orientation is
+/// turned, one for square pixels is made as wide as the pixels are, one that is known by its field of view
+/// (options.fov_deg, of the sensor's own orientation) is made. Adds to `warnings` what it did. Throws
+/// InputError for stereo and rolling shutters, whose images can't be turned.
+std::optional<PinholeCamera> CameraOfVideo(const std::string& name, const VideoDecoder& video,
+                                           const DatasetOptions& options, cv::Size size,
+                                           std::vector<std::string>& warnings);
 
 /// What a message about times that jump back says, the same of every kind of recording. `before_s` and
 /// `stamp_s`: of image number `at` and of the one before it [s].

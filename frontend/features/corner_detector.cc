@@ -1,11 +1,10 @@
-#include "frontend/features/corner_detector.h"
-
+// Corners of one level of a pyramid, spread over it by a grid.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 
 #include "core/fast_corners.h"
+#include "frontend/features/features.h"
 
 namespace tutti {
 namespace {
@@ -56,9 +55,7 @@ class CornerGrid {
     }
     return corners;
   }
-  std::vector<cv::KeyPoint> DetectAll(int threshold) const {
-    return Detect(cv::Rect({0, 0}, size_), threshold);
-  }
+  std::vector<cv::KeyPoint> DetectAll(int threshold) const { return Detect({{0, 0}, size_}, threshold); }
 
   void AddStrong(const std::vector<cv::KeyPoint>& corners) {
     for (const cv::KeyPoint& corner : corners) {
@@ -121,7 +118,7 @@ class CornerGrid {
  private:
   static constexpr Rank kNone = ~Rank{0};
 
-  // Of a cell, or of the one behind a row's last.
+  // `column` may be the one behind a row's last.
   std::size_t PlaceOf(int row, int column) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);
@@ -172,17 +169,12 @@ std::vector<cv::KeyPoint> DetectCorners(const cv::Mat& image, const CornerOption
   CornerGrid grid(image, mask, options);
   const auto wanted = static_cast<std::size_t>(std::max(0, options.wanted));
   std::vector<cv::KeyPoint> corners = grid.DetectAll(options.threshold);
+  const bool enough = corners.size() > wanted;
+  if (!enough) corners = grid.DetectAll(options.threshold_min);
   if (corners.size() > wanted) {
     grid.AddStrong(corners);
-    grid.FillEmpty();
+    enough ? grid.FillEmpty() : grid.AddWeak(corners);
     corners = grid.Strongest();
-  } else {
-    corners = grid.DetectAll(options.threshold_min);
-    if (corners.size() > wanted) {
-      grid.AddStrong(corners);
-      grid.AddWeak(corners);
-      corners = grid.Strongest();
-    }
   }
   const auto border = static_cast<float>(options.border);
   for (cv::KeyPoint& corner : corners) corner.pt += cv::Point2f(border, border);

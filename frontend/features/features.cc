@@ -1,8 +1,5 @@
 #include "frontend/features/features.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <cstring>
 #include <numeric>
 #include <opencv2/features2d.hpp>
@@ -11,8 +8,6 @@
 #include "core/clones.h"
 #include "core/intensity_centroid.h"
 #include "core/orb_description.h"
-#include "frontend/features/corner_detector.h"
-#include "frontend/features/stereo_matcher.h"
 
 namespace tutti {
 namespace {
@@ -24,10 +19,9 @@ constexpr int kHalfPatch = internal::IntensityCentroid::kRadius;  // [px]
 const internal::IntensityCentroid& OrientationPatch() {
   static const internal::IntensityCentroid patch = [] {
     internal::IntensityCentroid::HalfWidths widths{};
-    for (int v = 0; v <= kHalfPatch; ++v) {
+    for (int v = 0; v <= kHalfPatch; ++v)
       widths[static_cast<std::size_t>(v)] =
           static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
-    }
     return internal::IntensityCentroid(widths);
   }();
   return patch;
@@ -134,19 +128,16 @@ void FrameFeatures::FillGrid() {
     return pixel > 0 ? static_cast<int>(std::min(pixel, static_cast<float>(cells * kCell - 1))) / kCell : 0;
   };
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    const int c = cell_at(keypoints[i].pt.x, columns_);
-    const int r = cell_at(keypoints[i].pt.y, rows_);
-    const int cell = r * columns_ + c;
+    const int cell = cell_at(keypoints[i].pt.y, rows_) * columns_ + cell_at(keypoints[i].pt.x, columns_);
     cell_of[i] = static_cast<std::size_t>(cell);
     ++first_entry_[cell_of[i] + 1];
   }
   std::partial_sum(first_entry_.begin(), first_entry_.end(), first_entry_.begin());
   entries_.resize(keypoints.size());
   std::vector<int> next(first_entry_.begin(), first_entry_.end() - 1);
-  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+  for (std::size_t i = 0; i < keypoints.size(); ++i)
     entries_[static_cast<std::size_t>(next[cell_of[i]]++)] = {keypoints[i].pt, keypoints[i].octave,
                                                               static_cast<int>(i)};
-  }
 }
 
 void FrameFeatures::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
@@ -166,9 +157,8 @@ std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features
 std::vector<float> PyramidScales(const OdometryOptions& options) {
   std::vector<float> scales;
   scales.reserve(static_cast<std::size_t>(std::max(0, options.pyramid_levels)));
-  for (int l = 0; l < options.pyramid_levels; ++l) {
+  for (int l = 0; l < options.pyramid_levels; ++l)
     scales.push_back(static_cast<float>(std::pow(options.scale_factor, l)));
-  }
   return scales;
 }
 
@@ -193,13 +183,10 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
   std::vector<cv::Mat> descriptors;
   for (std::size_t l = 0; l < pyramid.size(); ++l) {
     const cv::Mat& image = pyramid[l];
-    // Pixel centres have integer coordinates on every level, so the levels' corners are half a pixel apart;
-    // and their sizes are rounded. Ignoring either biases coarse features by more than a pixel, and mono
-    // scale drifts with them.
-    const float sx = static_cast<float>(pyramid[0].cols) / static_cast<float>(image.cols);
-    const float sy = static_cast<float>(pyramid[0].rows) / static_cast<float>(image.rows);
-    const auto in_image = [sx, sy](const cv::Point2f& p) {
-      return cv::Point2f((p.x + 0.5F) * sx - 0.5F, (p.y + 0.5F) * sy - 0.5F);
+    // With the scales of the options, or without the half pixel, coarse features are biased by more than a
+    // pixel, and mono scale drifts with them.
+    const auto in_image = [s = LevelScale(pyramid[0], image)](const cv::Point2f& p) {
+      return cv::Point2f((p.x + 0.5F) * s.x - 0.5F, (p.y + 0.5F) * s.y - 0.5F);
     };
     std::vector<cv::KeyPoint> corners =
         DetectCorners(image, {wanted[l], options.fast_threshold, options.fast_threshold_min, kBorder},
@@ -252,8 +239,8 @@ void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const Odome
                        FrameFeatures* features) {
   for (std::size_t i = 0; i < features->size(); ++i) {
     const cv::Point2f& p = features->keypoints[i].pt;
-    const float inverse = InverseDepthAt(depth_m, static_cast<int>(std::lround(p.x)),
-                                         static_cast<int>(std::lround(p.y)), rig, options);
+    const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
+    const float inverse = InverseDepthAt(depth_m, x, y, rig, options);
     if (!(inverse > 0)) continue;
     features->inverse_depth[i] = inverse;
     features->inverse_depth_sigma[i] = static_cast<float>(options.rgbd_inverse_sigma);
@@ -263,8 +250,7 @@ void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const Odome
 // About 2000 elements: enough for any image that is aligned by them.
 std::shared_ptr<const DepthGrid> GridOf(const cv::Mat& depth_m, const cv::Mat& mask, const CameraRig& rig,
                                         const OdometryOptions& options) {
-  constexpr int kElements = 2000;
-  constexpr int kFinest = 8;  // [px]
+  constexpr int kElements = 2000, kFinest = 8;  // [px]
   auto grid = std::make_shared<DepthGrid>();
   const double area = double(depth_m.cols) * depth_m.rows;
   grid->step = std::max(kFinest, static_cast<int>(std::lround(std::sqrt(area / kElements))));

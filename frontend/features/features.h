@@ -6,19 +6,49 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <opencv2/core.hpp>
-#include <string>
+#include <utility>
 #include <vector>
 
-#include "frontend/features/pyramid.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {
+
+/// An image and its smaller ones. Those of a saved map are made when they are first asked for: of most maps
+/// that are loaded they never are.
+class Pyramid {
+ public:
+  Pyramid() = default;
+  /// CV_8UC1; level 0 is the image.
+  explicit Pyramid(std::vector<cv::Mat> levels) : levels_(std::move(levels)) {}
+
+  /// Any thread may ask.
+  const std::vector<cv::Mat>& Levels() const;
+  /// For saved maps; defined in frontend/store/features_state.h.
+  template <class Archive>
+  void State(Archive& archive);
+
+ private:
+  mutable std::once_flag made_;
+  mutable std::function<std::vector<cv::Mat>()> make_;  // null: they are there
+  mutable std::vector<cv::Mat> levels_;
+};
+
+/// The level of a pyramid after `image`.
+cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size);
+/// Width and height of a level's pixels [px of the whole image]. As the sizes of levels are rounded, these
+/// are not quite the scales of the options. Pixel centres have integer coordinates on every level, so that
+/// the levels' corners are half a pixel apart: u of a level is (u + 0.5) scale - 0.5 of the whole image.
+inline cv::Point2f LevelScale(const cv::Mat& whole, const cv::Mat& level) {
+  return {static_cast<float>(whole.cols) / static_cast<float>(level.cols),
+          static_cast<float>(whole.rows) / static_cast<float>(level.rows)};
+}
 
 /// Number of differing bits of two 256-bit descriptors.
 int HammingDistance(const std::uint8_t* a, const std::uint8_t* b);
@@ -37,7 +67,7 @@ struct DepthGrid {
   Eigen::Vector2d PixelOf(int row, int column) const {
     return {step / 2 + column * step, step / 2 + row * step};
   }
-  /// Of the element nearest to a pixel, without its sign.
+  /// The element nearest to a pixel, without its sign.
   float Near(const Eigen::Vector2d& pixel) const {
     const int first = step / 2;
     const auto nearest = [&](double at, int count) {
@@ -68,7 +98,7 @@ struct FrameFeatures {
   /// cell of the grid.
   void InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
               std::vector<int>* out) const;
-  /// The same, for each of them: visit(pixel, octave, index).
+  /// Calls visit(pixel, octave, index) for each of them.
   template <class Visit>
   void ForEachInArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
                      const Visit& visit) const;
@@ -131,10 +161,34 @@ std::vector<float> PyramidScales(const OdometryOptions& options);
 /// Image pyramid; level l is smaller by scale_factor^l.
 std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& options);
 
+/// Two thresholds, and how many corners to keep.
+struct CornerOptions {
+  int wanted = 0;
+  int threshold = 0;      ///< of corners, where there are any
+  int threshold_min = 0;  ///< in cells of the grid that have none; at most `threshold`
+  int border = 0;         ///< [px] no corner lies nearer to the image's rim; at least 3
+};
+
+/// FAST corners of an 8-bit grey image at whole pixels, with FAST's score as response (E. Rosten, T.
+/// Drummond, "Machine learning for high-speed corner detection", ECCV 2006; OpenCV's). If there are more than
+/// wanted, then round by round the strongest that is left in each cell of a grid, and in the order of their
+/// strength; corners below the upper threshold count only where a cell has nothing better, so that weak
+/// texture is covered without crowding out strong corners. An image that is smaller than its borders has
+/// none, and neither has a place where `mask` (CV_8UC1, as large as the image; empty: nowhere) is 0.
+std::vector<cv::KeyPoint> DetectCorners(const cv::Mat& image, const CornerOptions& options,
+                                        const cv::Mat& mask = {});
+
 /// Detects and describes features of one 8-bit grey image; no depth. Blank or tiny images give none. No
 /// feature's pixel, rounded, is one where `mask` (CV_8UC1, as large as level 0; empty: nowhere) is 0.
 FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options,
                          const cv::Mat& mask = {});
+
+/// Finds each left feature of a rectified pair in the right image: best descriptor along its row, then the
+/// disparity at the keypoint by a least-squares fit of a slanted surface on the feature's pyramid level.
+/// Fills inverse_depth, its sigma, row_error_px and stereo_matches.
+void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv::Mat>& right_pyramid,
+                 const FrameFeatures& right, const CameraRig& rig, const OdometryOptions& options,
+                 FrameFeatures* left);
 
 /// Everything for one frame of the rig: features of the (left) image, and depth from the depth image or from
 /// the right image (descriptor search along the row, then a least-squares fit). Pure: may run on any thread.

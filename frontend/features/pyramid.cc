@@ -1,6 +1,7 @@
-#include "frontend/features/pyramid.h"
-
+// Not in features.cc: the thread sanitizer has to see this.
 #include <opencv2/imgproc.hpp>
+
+#include "frontend/features/features.h"
 
 namespace tutti {
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "tutti/core/error.h"
@@ -42,10 +43,9 @@ PinholeCamera CameraForView(const View& view, int width, int height, double fx_o
   camera.width = width;
   camera.height = height;
   const double view_width = view.right - view.left, view_height = view.bottom - view.top;
-  if (!(view_width > 1e-3 && view_height > 1e-3)) {
+  if (!(view_width > 1e-3 && view_height > 1e-3))
     throw InputError(
         "camera: the distortion leaves no usable view; check the distortion model and its coefficients");
-  }
   camera.fy = std::max((height - 1) / view_height, (width - 1) / view_width / fx_over_fy);
   camera.fx = camera.fy * fx_over_fy;
   camera.cx = 0.5 * (width - 1) - camera.fx * 0.5 * (view.left + view.right);
@@ -101,33 +101,24 @@ cv::Mat Rectifier::Apply(const cv::Mat& image, Sampling sampling) const {
 
 StereoRectification RectifyStereo(const PinholeCamera& left, const PinholeCamera& right,
                                   const Pose& T_right_left) {
-  if (left.width != right.width || left.height != right.height) {
+  if (left.width != right.width || left.height != right.height)
     throw InputError("stereo calibration: the two cameras have different image sizes; they must be equal");
-  }
   // The right camera's position, seen from the left one.
   const Eigen::Vector3d position = T_right_left.Inverse().translation;
-  if (!(position.x() > 0) || position.x() < position.tail<2>().norm()) {
+  if (!(position.x() > 0) || position.x() < position.tail<2>().norm())
     throw InputError(
         "stereo calibration: the second camera does not lie to the right of the first; swap the two");
-  }
   // cv::stereoRectify finds the two rotations; they depend on the extrinsics alone, so any intrinsics will do
   // here.
   const cv::Mat k = (cv::Mat_<double>(3, 3) << left.fx, 0, left.cx, 0, left.fy, left.cy, 0, 0, 1);
-  cv::Mat rotation(3, 3, CV_64F), translation(3, 1, CV_64F), r_left, r_right, p_left, p_right, q;
-  const Eigen::Matrix3d R = T_right_left.rotation.toRotationMatrix();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) rotation.at<double>(i, j) = R(i, j);
-    translation.at<double>(i) = T_right_left.translation(i);
-  }
+  cv::Mat rotation, translation, r_left, r_right, p_left, p_right, q;
+  cv::eigen2cv(T_right_left.rotation.toRotationMatrix(), rotation);
+  cv::eigen2cv(T_right_left.translation, translation);
   cv::stereoRectify(k, cv::noArray(), k, cv::noArray(), cv::Size(left.width, left.height), rotation,
                     translation, r_left, r_right, p_left, p_right, q);
   Eigen::Matrix3d R_left, R_right;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      R_left(i, j) = r_left.at<double>(i, j);
-      R_right(i, j) = r_right.at<double>(i, j);
-    }
-  }
+  cv::cv2eigen(r_left, R_left);
+  cv::cv2eigen(r_right, R_right);
   const View a = InnerView(left, R_left), b = InnerView(right, R_right);
   const View common{std::max(a.left, b.left), std::min(a.right, b.right), std::max(a.top, b.top),
                     std::min(a.bottom, b.bottom)};

@@ -1,14 +1,13 @@
-#include "frontend/features/stereo_matcher.h"
-
+// Depth of left features from a rectified stereo pair.
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 #include "core/median.h"
 #include "core/sanitized_range.h"
 #include "core/small_ldlt.h"
+#include "frontend/features/features.h"
 #include "frontend/features/grey_window.h"
 
 namespace tutti {
@@ -140,6 +139,7 @@ bool FitWarp(const cv::Mat& left, const cv::Mat& right, int x, int y, Warp* warp
 }
 
 struct Refined {
+  std::size_t feature = 0;
   double disparity = 0, row_error = 0;  // level-0 pixels
   float residual = 0;                   // [grey levels^2]
 };
@@ -177,15 +177,8 @@ bool Refine(const cv::Mat& left, const cv::Mat& right, const cv::Point2f& scale,
   return true;
 }
 
-}  // namespace
-
-void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv::Mat>& right_pyramid,
-                 const FrameFeatures& right, const CameraRig& rig, const OdometryOptions& options,
-                 FrameFeatures* left) {
-  const std::vector<float> scales = PyramidScales(options);
-  const int rows = left_pyramid[0].rows;
-  const double fb = rig.camera.fx * rig.baseline_m;
-  // Right features by row; each stands in all the rows in which a left feature may match it.
+// Right features by row; each stands in all the rows in which a left feature may match it.
+std::vector<std::vector<int>> ByRow(const FrameFeatures& right, const std::vector<float>& scales, int rows) {
   std::vector<std::vector<int>> by_row(static_cast<std::size_t>(rows));
   for (std::size_t j = 0; j < right.size(); ++j) {
     const cv::KeyPoint& k = right.keypoints[j];
@@ -194,52 +187,60 @@ void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv:
     const int last = std::min(rows - 1, static_cast<int>(std::ceil(k.pt.y + band)));
     for (int r = first; r <= last; ++r) by_row[static_cast<std::size_t>(r)].push_back(static_cast<int>(j));
   }
-  struct Found {
-    std::size_t feature;
-    double disparity, row_error;
-    float residual;
-  };
-  std::vector<Found> found;
+  return by_row;
+}
+
+// The right feature of these that looks most like left feature i; -1: none does.
+int BestMatch(const FrameFeatures& left, std::size_t i, const FrameFeatures& right,
+              const std::vector<int>& in_row, float max_disparity) {
+  const cv::KeyPoint& k = left.keypoints[i];
+  int best = kMaxDistance, best_j = -1;
+  for (const int j : in_row) {
+    const cv::KeyPoint& r = right.keypoints[static_cast<std::size_t>(j)];
+    if (std::abs(r.octave - k.octave) > 1 || r.pt.x > k.pt.x + 2 || r.pt.x < k.pt.x - max_disparity) continue;
+    const int distance = HammingDistance(left.Descriptor(static_cast<int>(i)), right.Descriptor(j));
+    if (distance >= best) continue;
+    best = distance;
+    best_j = j;
+  }
+  return best_j;
+}
+
+}  // namespace
+
+void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv::Mat>& right_pyramid,
+                 const FrameFeatures& right, const CameraRig& rig, const OdometryOptions& options,
+                 FrameFeatures* left) {
+  const std::vector<float> scales = PyramidScales(options);
+  const int rows = left_pyramid[0].rows;
+  const double fb = rig.camera.fx * rig.baseline_m;
+  const std::vector<std::vector<int>> by_row = ByRow(right, scales, rows);
+  std::vector<Refined> found;
   // The nearest point that is looked for: half a baseline away would leave no overlap.
   const float max_disparity = static_cast<float>(rig.camera.fx / 1.5);
   for (std::size_t i = 0; i < left->size(); ++i) {
     const cv::KeyPoint& k = left->keypoints[i];
-    int best = kMaxDistance, best_j = -1;
-    for (int j :
-         by_row[static_cast<std::size_t>(std::clamp(static_cast<int>(std::lround(k.pt.y)), 0, rows - 1))]) {
-      const cv::KeyPoint& r = right.keypoints[static_cast<std::size_t>(j)];
-      if (std::abs(r.octave - k.octave) > 1 || r.pt.x > k.pt.x + 2 || r.pt.x < k.pt.x - max_disparity)
-        continue;
-      const int distance = HammingDistance(left->Descriptor(static_cast<int>(i)), right.Descriptor(j));
-      if (distance < best) {
-        best = distance;
-        best_j = j;
-      }
-    }
-    if (best_j < 0) continue;
+    const int row = std::clamp(static_cast<int>(std::lround(k.pt.y)), 0, rows - 1);
+    const int j = BestMatch(*left, i, right, by_row[static_cast<std::size_t>(row)], max_disparity);
     const std::size_t level = static_cast<std::size_t>(k.octave);
-    if (level >= right_pyramid.size()) continue;
+    if (j < 0 || level >= right_pyramid.size()) continue;
     Refined refined;
-    // The sizes of the levels are rounded, so their scales are not quite those of the options.
-    const cv::Mat &whole = left_pyramid[0], &reduced = left_pyramid[level];
-    const cv::Point2f scale(static_cast<float>(whole.cols) / static_cast<float>(reduced.cols),
-                            static_cast<float>(whole.rows) / static_cast<float>(reduced.rows));
-    if (!Refine(left_pyramid[level], right_pyramid[level], scale, k.pt,
-                right.keypoints[static_cast<std::size_t>(best_j)].pt.x, &refined)) {
+    if (!Refine(left_pyramid[level], right_pyramid[level], LevelScale(left_pyramid[0], left_pyramid[level]),
+                k.pt, right.keypoints[static_cast<std::size_t>(j)].pt.x, &refined))
       continue;
-    }
     if (refined.disparity < -1.0 || refined.disparity > max_disparity) continue;
-    found.push_back({i, std::max(refined.disparity, 0.01), refined.row_error, refined.residual});
+    refined.feature = i;
+    refined.disparity = std::max(refined.disparity, 0.01);
+    found.push_back(refined);
   }
   if (found.empty()) return;
   // Matches whose windows differ far more than the median's are wrong (Mur-Artal & Tardos, T-RO 2017, section
   // III-A).
   std::vector<float> residuals;
-  residuals.reserve(found.size());
-  for (const Found& f : found) residuals.push_back(f.residual);
+  for (const Refined& f : found) residuals.push_back(f.residual);
   const float limit = kResidualRatio * internal::Median(std::move(residuals));
   std::vector<double> errors;
-  for (const Found& f : found) {
+  for (const Refined& f : found) {
     if (f.residual > limit) continue;
     const float scale = scales[static_cast<std::size_t>(left->keypoints[f.feature].octave)];
     left->inverse_depth[f.feature] = static_cast<float>(f.disparity / fb);

@@ -1,15 +1,14 @@
-#include "frontend/geometry/essential_matrix.h"
-
+// The essential matrix of two views of one calibrated camera.
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/core.hpp>
 
 #include "core/dense_solvers.h"
 #include "core/householder.h"
+#include "frontend/geometry/two_view.h"
 
 namespace tutti::internal {
 namespace {
@@ -25,16 +24,9 @@ using Cubic = Eigen::Matrix<double, 20, 1>;
 // Where a product of two coefficients belongs.
 constexpr std::array<std::array<int, 4>, 4> kQuadratic = {
     {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}}};
-constexpr std::array<std::array<int, 4>, 10> kCubic = {{{0, 1, 2, 10},
-                                                        {1, 3, 4, 11},
-                                                        {2, 4, 5, 12},
-                                                        {10, 11, 12, 16},
-                                                        {3, 6, 7, 13},
-                                                        {4, 7, 8, 14},
-                                                        {11, 13, 14, 17},
-                                                        {5, 8, 9, 15},
-                                                        {12, 14, 15, 18},
-                                                        {16, 17, 18, 19}}};
+constexpr int kCubic[10][4] = {{0, 1, 2, 10},    {1, 3, 4, 11},   {2, 4, 5, 12},    {10, 11, 12, 16},
+                               {3, 6, 7, 13},    {4, 7, 8, 14},   {11, 13, 14, 17}, {5, 8, 9, 15},
+                               {12, 14, 15, 18}, {16, 17, 18, 19}};
 
 Quadratic Product(const Linear& a, const Linear& b) {
   Quadratic product = Quadratic::Zero();
@@ -68,10 +60,9 @@ Eigen::Matrix<double, 10, 20> Constraints(const std::array<std::array<Linear, 3>
   const Quadratic half_trace = 0.5 * (square[0][0] + square[1][1] + square[2][2]);
   for (int i = 0; i < 3; ++i) square[i][i] -= half_trace;
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
+    for (int c = 0; c < 3; ++c)
       constraints.row(1 + 3 * r + c) =
           Product(square[r][0], e[0][c]) + Product(square[r][1], e[1][c]) + Product(square[r][2], e[2][c]);
-    }
   }
   return constraints;
 }

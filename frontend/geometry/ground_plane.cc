@@ -42,12 +42,13 @@ Field LookedAt(const Eigen::Vector3d& plane) {
   return field;
 }
 
-// The columns of a row of the image that are in it.
-struct Columns {
-  int from = 0, to = 0;  // the last one is in, too
+// The part of a row of the image that is in the field: columns from..to, the last one, too.
+struct RowPart {
+  int row = 0, from = 0, to = -1;
 };
 
-Columns ColumnsOf(const PinholeCamera& camera, const cv::Mat& image, const Field& field, double y) {
+RowPart PartOf(const PinholeCamera& camera, const cv::Mat& image, const Field& field, int row) {
+  const double y = (row - camera.cy) / camera.fy;
   double from = 1, to = image.cols - 2;
   for (int i = 0; i < field.rows(); ++i) {
     const double slope = field(i, 0) / camera.fx;
@@ -57,40 +58,36 @@ Columns ColumnsOf(const PinholeCamera& camera, const cv::Mat& image, const Field
       continue;
     }
     const double edge = camera.cx - at_cx / slope;
-    if (slope > 0) {
+    if (slope > 0)
       from = std::max(from, edge);
-    } else {
+    else
       to = std::min(to, edge);
-    }
   }
-  if (!(to >= from)) return {0, -1};
-  return {static_cast<int>(std::ceil(from)), static_cast<int>(std::floor(to))};
+  if (!(to >= from)) return {};
+  return {row, static_cast<int>(std::ceil(from)), static_cast<int>(std::floor(to))};
 }
 
-// Of what the plane says is ground, at most so many pixels on a regular grid.
+// Takes at most so many pixels, on a regular grid, of what the plane says is ground.
 std::vector<Pixel> GroundPixels(const PinholeCamera& camera, const cv::Mat& image,
                                 const Eigen::Vector3d& plane, double most) {
   const Field field = LookedAt(plane);
-  struct Row {
-    int v;
-    Columns columns;
-  };
-  std::vector<Row> rows;
+  std::vector<RowPart> parts;
   double area = 0;
   for (int v = kFromEdge; v < image.rows - kFromEdge; ++v) {
-    const Columns columns = ColumnsOf(camera, image, field, (v - camera.cy) / camera.fy);
-    if (columns.to <= columns.from) continue;
-    area += columns.to - columns.from;
-    rows.push_back({v, columns});
+    const RowPart part = PartOf(camera, image, field, v);
+    if (part.to <= part.from) continue;
+    area += part.to - part.from;
+    parts.push_back(part);
   }
   std::vector<Pixel> pixels;
   if (area < kFewestPixels) return pixels;
   const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(area / most))));
-  for (const Row& row : rows) {
-    if (row.v % stride != 0) continue;
-    const unsigned char* const greys = image.ptr<unsigned char>(row.v);
-    for (int u = row.columns.from; u < row.columns.to; u += stride)
-      pixels.push_back({{(u - camera.cx) / camera.fx, (row.v - camera.cy) / camera.fy, 1}, double(greys[u])});
+  for (const RowPart& part : parts) {
+    if (part.row % stride != 0) continue;
+    const unsigned char* const greys = image.ptr<unsigned char>(part.row);
+    for (int u = part.from; u < part.to; u += stride)
+      pixels.push_back(
+          {{(u - camera.cx) / camera.fx, (part.row - camera.cy) / camera.fy, 1}, double(greys[u])});
   }
   return pixels;
 }

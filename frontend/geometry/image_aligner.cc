@@ -1,7 +1,6 @@
 #include "frontend/geometry/image_aligner.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -15,10 +14,9 @@ namespace {
 constexpr int kHalfSquare = 1;  // of the square that is compared [px of the level]
 constexpr int kSamples = (2 * kHalfSquare + 1) * (2 * kHalfSquare + 1);
 constexpr int kLeastPoints = 60;
-constexpr int kAlignerIterations = 12;
 constexpr double kSampleSigma = 8;       // of what a sample may differ by [grey levels]; beyond, Huber's loss
 constexpr double kLeastExplained = 0.5;  // of the variance of the samples
-constexpr internal::GaussNewtonLimits kAlignerLimits{kAlignerIterations, 1e-5, 1e-4, 1e-9};
+constexpr internal::GaussNewtonLimits kAlignerLimits{12, 1e-5, 1e-4, 1e-9};
 constexpr int kUnknowns = 13;  // pose, motion, brightness
 constexpr std::size_t kMostPoints = 1000;
 constexpr int kLeastContrast = 3;     // of what is worth a look [grey levels]

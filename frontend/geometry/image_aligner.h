@@ -26,7 +26,7 @@ struct CameraMotion {
 
   /// T_then_now: `seconds` later.
   Pose Then(double seconds) const { return ExpSE3((motion + 0.5 * seconds * change) * seconds); }
-  /// The same, from a time that is `time` later.
+  /// Starts from a time that is `time` later.
   Pose Then(double time, double seconds) const {
     return ExpSE3((motion + (time + 0.5 * seconds) * change) * seconds);
   }

@@ -19,36 +19,28 @@ struct LensError {
     archive(value, information);
   }
   /// d pixel / d value at a pixel, 2x2.
-  static Eigen::Matrix2d Jacobian(const PinholeCamera& camera, const Eigen::Vector2d& pixel);
+  static Eigen::Matrix2d Jacobian(const PinholeCamera& camera, const Eigen::Vector2d& pixel) {
+    const Eigen::Vector2d d = pixel - Eigen::Vector2d(camera.cx, camera.cy);
+    const double r2 = d.x() * d.x() / (camera.fx * camera.fx) + d.y() * d.y() / (camera.fy * camera.fy);
+    Eigen::Matrix2d j;
+    j.col(0) = d * r2;
+    j.col(1) = d * (r2 * r2);
+    return j;
+  }
   /// Where a pixel belongs.
   static Eigen::Vector2d Correct(const PinholeCamera& camera, const Eigen::Vector2d& value,
-                                 const Eigen::Vector2d& pixel);
+                                 const Eigen::Vector2d& pixel) {
+    return pixel + Jacobian(camera, pixel) * value;
+  }
   /// The inverse of Correct.
   static Eigen::Vector2d Uncorrect(const PinholeCamera& camera, const Eigen::Vector2d& value,
-                                   const Eigen::Vector2d& corrected);
+                                   const Eigen::Vector2d& corrected) {
+    Eigen::Vector2d pixel = corrected;
+    if (value.isZero()) return pixel;
+    for (int i = 0; i < 5; ++i)
+      pixel = corrected - Jacobian(camera, pixel) * value;  // each divides by 20 or more
+    return pixel;
+  }
 };
-
-inline Eigen::Matrix2d LensError::Jacobian(const PinholeCamera& camera, const Eigen::Vector2d& pixel) {
-  const Eigen::Vector2d d = pixel - Eigen::Vector2d(camera.cx, camera.cy);
-  const double r2 = d.x() * d.x() / (camera.fx * camera.fx) + d.y() * d.y() / (camera.fy * camera.fy);
-  Eigen::Matrix2d j;
-  j.col(0) = d * r2;
-  j.col(1) = d * (r2 * r2);
-  return j;
-}
-
-inline Eigen::Vector2d LensError::Correct(const PinholeCamera& camera, const Eigen::Vector2d& value,
-                                          const Eigen::Vector2d& pixel) {
-  return pixel + Jacobian(camera, pixel) * value;
-}
-
-inline Eigen::Vector2d LensError::Uncorrect(const PinholeCamera& camera, const Eigen::Vector2d& value,
-                                            const Eigen::Vector2d& corrected) {
-  Eigen::Vector2d pixel = corrected;
-  if (value.isZero()) return pixel;
-  for (int i = 0; i < 5; ++i)
-    pixel = corrected - Jacobian(camera, pixel) * value;  // each divides by 20 or more
-  return pixel;
-}
 
 }  // namespace tutti

@@ -1,9 +1,6 @@
 #include "frontend/geometry/pose_solver.h"
 
-#include <cmath>
 #include <opencv2/calib3d.hpp>
-
-#include "core/least_squares.h"
 
 namespace tutti {
 namespace {
@@ -26,36 +23,16 @@ bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_worl
 
 int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>& observations,
                Pose* T_camera_world, std::vector<char>* inlier) {
-  inlier->assign(observations.size(), 1);
-  int inliers = 0;
-  for (int round = 0; round < 4; ++round) {
-    const bool robust = round < 3;
-    const auto linearise = [&](internal::NormalEquations<6>& equations) {
-      for (std::size_t i = 0; i < observations.size(); ++i) {
-        if (!(*inlier)[i]) continue;
-        Eigen::Vector3d r;
-        Eigen::Matrix<double, 3, 6> j;
-        if (!ReprojectionResidual(camera, *T_camera_world, observations[i], &r, &j)) continue;
-        const double s = r.squaredNorm(), bound = robust ? ChiSquareBound(observations[i]) : INFINITY;
-        equations.Add(j, r, internal::HuberWeight(s, bound));
-        equations.cost += internal::HuberCost(s, bound);
-      }
-    };
-    // Left perturbation: translation and rotation act on the point in the camera frame.
-    const auto move = [&](const Vector6d& step) {
-      *T_camera_world = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * *T_camera_world;
-      return true;
-    };
-    internal::GaussNewton<6>(kLimits, linearise, move);
-    inliers = 0;
-    for (std::size_t i = 0; i < observations.size(); ++i) {
-      Eigen::Vector3d r;
-      (*inlier)[i] = ReprojectionResidual(camera, *T_camera_world, observations[i], &r, nullptr) &&
-                     r.squaredNorm() <= ChiSquareBound(observations[i]);
-      inliers += (*inlier)[i];
-    }
-    if (inliers < 4) break;
-  }
+  const auto residual = [&](const PointObservation& o, Eigen::Vector3d* r, Eigen::Matrix<double, 3, 6>* j) {
+    return ReprojectionResidual(camera, *T_camera_world, o, r, j);
+  };
+  // Left perturbation: translation and rotation act on the point in the camera frame.
+  const auto move = [&](const Vector6d& step) {
+    *T_camera_world = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * *T_camera_world;
+    return true;
+  };
+  const auto no_prior = [](internal::NormalEquations<6>*) {};
+  const int inliers = RefineOnInliers<6>(observations, kLimits, 4, residual, no_prior, move, inlier);
   if (!T_camera_world->IsFinite()) {
     *T_camera_world = Pose();
     inlier->assign(observations.size(), 0);

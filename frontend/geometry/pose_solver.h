@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
+#include "core/least_squares.h"
 #include "core/reprojection.h"
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
@@ -42,8 +44,46 @@ bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_worl
 /// squared residuals count by the Huber loss beyond.
 inline double ChiSquareBound(const PointObservation& o) { return o.inverse_depth_sigma > 0 ? 7.815 : 5.991; }
 
-/// Minimises the Huber-robust reprojection error over the pose by Gauss-Newton in four rounds, each on the
-/// inliers of the round before. Returns the number of inliers; `inlier` has one flag per observation.
+/// Robust Gauss-Newton over N unknowns in four rounds, each on the inliers of the round before; Huber's loss
+/// bounds what the others of a round count, but in the last one. Ends where fewer than `least` are left.
+/// Returns the number of inliers; `inlier` has one flag per observation. `residual(observation, &r,
+/// &jacobian)` is ReprojectionResidual by the unknowns, `prior(&equations)` adds what else is known, `move`
+/// is GaussNewton's.
+template <int N, class Residual, class Prior, class Move>
+int RefineOnInliers(const std::vector<PointObservation>& observations,
+                    const internal::GaussNewtonLimits& limits, int least, const Residual& residual,
+                    const Prior& prior, const Move& move, std::vector<char>* inlier) {
+  constexpr int kRounds = 4;
+  using Jacobian = Eigen::Matrix<double, 3, N>;
+  inlier->assign(observations.size(), 1);
+  int inliers = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    const bool robust = round + 1 < kRounds;
+    const auto linearise = [&](internal::NormalEquations<N>& equations) {
+      for (std::size_t i = 0; i < observations.size(); ++i) {
+        Eigen::Vector3d r;
+        Jacobian j;
+        if (!(*inlier)[i] || !residual(observations[i], &r, &j)) continue;
+        const double s = r.squaredNorm(), bound = robust ? ChiSquareBound(observations[i]) : INFINITY;
+        equations.Add(j, r, internal::HuberWeight(s, bound));
+        equations.cost += internal::HuberCost(s, bound);
+      }
+      prior(&equations);
+    };
+    internal::GaussNewton<N>(limits, linearise, move);
+    inliers = 0;
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      Eigen::Vector3d r;
+      (*inlier)[i] = residual(observations[i], &r, static_cast<Jacobian*>(nullptr)) &&
+                     r.squaredNorm() <= ChiSquareBound(observations[i]);
+      inliers += (*inlier)[i];
+    }
+    if (inliers < least) break;
+  }
+  return inliers;
+}
+
+/// RefineOnInliers over the pose.
 int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>& observations,
                Pose* T_camera_world, std::vector<char>* inlier);
 

@@ -1,12 +1,9 @@
 #include "frontend/geometry/rolling_shutter.h"
 
-#include <cmath>
-
 namespace tutti {
 namespace {
 
 constexpr internal::GaussNewtonLimits kShutterLimits{10, 1e-7, 1e-5, 0};
-constexpr int kRounds = 4;
 
 }  // namespace
 
@@ -35,42 +32,24 @@ int RollingShutter::Refine(const std::vector<PointObservation>& observations, co
                            Pose* T_camera_world, Vector6d* motion, std::vector<char>* inlier) const {
   using Matrix3x12 = Eigen::Matrix<double, 3, 12>;
   *motion = prior.motion;
-  inlier->assign(observations.size(), 1);
-  const auto then = [&](const PointObservation& o) {
-    return ExpSE3(*motion * TimeOf(o.pixel.y())) * *T_camera_world;
+  const auto residual = [&](const PointObservation& o, Eigen::Vector3d* r, Matrix3x12* j) {
+    const Pose then = ExpSE3(*motion * TimeOf(o.pixel.y())) * *T_camera_world;
+    if (j == nullptr) return ReprojectionResidual(camera_, then, o, r, nullptr);
+    Eigen::Matrix<double, 3, 6> by_pose;
+    if (!ReprojectionResidual(camera_, then, o, r, &by_pose)) return false;
+    *j << by_pose,
+        by_pose * TimeOf(o.pixel.y());  // rows are near in time: their poses move as the middle one's
+    return true;
   };
-  int inliers = 0;
-  for (int round = 0; round < kRounds; ++round) {
-    const bool robust = round + 1 < kRounds;
-    const auto linearise = [&](internal::NormalEquations<12>& equations) {
-      for (std::size_t i = 0; i < observations.size(); ++i) {
-        const PointObservation& o = observations[i];
-        Eigen::Vector3d r;
-        Eigen::Matrix<double, 3, 6> by_pose;
-        if (!(*inlier)[i] || !ReprojectionResidual(camera_, then(o), o, &r, &by_pose)) continue;
-        Matrix3x12 j;  // rows are near in time: the pose of a row moves as that of the middle one does
-        j << by_pose, by_pose * TimeOf(o.pixel.y());
-        const double s = r.squaredNorm(), bound = robust ? ChiSquareBound(o) : INFINITY;
-        equations.Add(j, r, internal::HuberWeight(s, bound));
-        equations.cost += internal::HuberCost(s, bound);
-      }
-      prior.Add(*T_camera_world, *motion, &equations);
-    };
-    const auto move = [&](const Eigen::Matrix<double, 12, 1>& step) {
-      *T_camera_world = Pose(ExpSO3(step.segment<3>(3)), step.head<3>()) * *T_camera_world;
-      *motion += step.tail<6>();
-      return true;
-    };
-    internal::GaussNewton<12>(kShutterLimits, linearise, move);
-    inliers = 0;
-    for (std::size_t i = 0; i < observations.size(); ++i) {
-      Eigen::Vector3d r;
-      (*inlier)[i] = ReprojectionResidual(camera_, then(observations[i]), observations[i], &r, nullptr) &&
-                     r.squaredNorm() <= ChiSquareBound(observations[i]);
-      inliers += (*inlier)[i];
-    }
-    if (inliers < 6) break;
-  }
+  const auto add_prior = [&](internal::NormalEquations<12>* equations) {
+    prior.Add(*T_camera_world, *motion, equations);
+  };
+  const auto move = [&](const Eigen::Matrix<double, 12, 1>& step) {
+    *T_camera_world = Pose(ExpSO3(step.segment<3>(3)), step.head<3>()) * *T_camera_world;
+    *motion += step.tail<6>();
+    return true;
+  };
+  const int inliers = RefineOnInliers<12>(observations, kShutterLimits, 6, residual, add_prior, move, inlier);
   if (T_camera_world->IsFinite() && motion->allFinite()) return inliers;
   inlier->assign(observations.size(), 0);
   return 0;

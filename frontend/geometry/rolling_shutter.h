@@ -9,7 +9,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/least_squares.h"
 #include "frontend/features/features.h"
 #include "frontend/geometry/pose_solver.h"
 #include "tutti/frontend/frame.h"
@@ -53,8 +52,7 @@ struct MotionPrior {
   }
 };
 
-/// Immutable. Motions are those of T_camera_world, per second: T_camera_world(t + s) = Exp(motion s)
-/// T_camera_world(t).
+/// Immutable. Motions are MotionPrior's.
 class RollingShutter {
  public:
   explicit RollingShutter(const CameraRig& rig) : camera_(rig.camera), readout_s_(rig.readout_s) {}

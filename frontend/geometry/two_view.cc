@@ -4,16 +4,15 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
-#include <optional>
 
 #include "core/dense_solvers.h"
 #include "core/reprojection.h"
-#include "frontend/geometry/essential_matrix.h"
 #include "frontend/geometry/pose_solver.h"
 
 namespace tutti {
 namespace {
 
+// With a translation of length 1.
 Pose ToPose(const cv::Mat& rotation, const cv::Mat& translation) {
   Eigen::Matrix<double, 3, 4> m;
   for (int r = 0; r < 3; ++r) {
@@ -112,6 +111,23 @@ double EpipolarScore(const Eigen::Matrix3d& f, const std::vector<cv::Point2f>& f
   return score;
 }
 
+std::vector<Pose> MotionsOfHomography(const cv::Mat& homography, const PinholeCamera& camera) {
+  const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
+  std::vector<cv::Mat> rotations, translations, normals;
+  cv::decomposeHomographyMat(homography, cv::Mat(k), rotations, translations, normals);
+  std::vector<Pose> motions;
+  for (std::size_t i = 0; i < rotations.size(); ++i) motions.push_back(ToPose(rotations[i], translations[i]));
+  return motions;
+}
+
+std::vector<Pose> MotionsOfEssential(const Eigen::Matrix3d& essential) {
+  cv::Mat e, r1, r2, t;
+  cv::eigen2cv(essential, e);
+  cv::decomposeEssentialMat(e, r1, r2, t);
+  const cv::Mat minus = -t;
+  return {ToPose(r1, t), ToPose(r1, minus), ToPose(r2, t), ToPose(r2, minus)};
+}
+
 }  // namespace
 
 Eigen::Vector3d Triangulate(const Eigen::Vector3d& first_ray, const Eigen::Vector3d& second_ray,
@@ -173,7 +189,6 @@ TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv:
     return result;
   }
   const double sigma = options.pixel_sigma;
-  const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
   const std::optional<internal::EssentialMatrix> essential = internal::FitEssential(
       Rays(camera, first), Rays(camera, second), 1.5 * sigma / (0.5 * (camera.fx + camera.fy)), 0.9999);
   if (!essential) {
@@ -193,50 +208,34 @@ TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv:
     cv::cv2eigen(homography, h);
     if (std::abs(h.determinant()) > 1e-12) score_h = HomographyScore(h, first, second, sigma);
   }
-  std::vector<Pose> motions;
   result.homography = score_h > 0.45 * (score_h + score_e) && !homography.empty();
-  if (result.homography) {
-    std::vector<cv::Mat> rotations, translations, normals;
-    cv::decomposeHomographyMat(homography, cv::Mat(k), rotations, translations, normals);
-    for (std::size_t i = 0; i < rotations.size(); ++i)
-      motions.push_back(ToPose(rotations[i], translations[i]));
-    inliers.assign(first.size(), 1);
-  } else {
-    cv::Mat e, r1, r2, t;
-    cv::eigen2cv(essential->matrix, e);
-    cv::decomposeEssentialMat(e, r1, r2, t);
-    const cv::Mat minus = -t;
-    motions = {ToPose(r1, t), ToPose(r1, minus), ToPose(r2, t), ToPose(r2, minus)};
-  }
-  const int candidates = static_cast<int>(std::count(inliers.begin(), inliers.end(), 1));
+  if (result.homography) inliers.assign(first.size(), 1);
+  const std::vector<Pose> motions =
+      result.homography ? MotionsOfHomography(homography, camera) : MotionsOfEssential(essential->matrix);
   int best = 0, second_best = 0;
   for (const Pose& motion : motions) {
     Trial trial = Test(camera, motion, first, second, inliers, 2.0 * sigma);
-    if (trial.good > best) {
-      second_best = best;
-      best = trial.good;
-      result.T_second_first = motion;
-      result.points = std::move(trial.points);
-      result.valid = std::move(trial.valid);
-      result.parallax_deg = trial.parallax_deg;
-    } else {
-      second_best = std::max(second_best, trial.good);
-    }
+    second_best = std::max(second_best, std::min(best, trial.good));
+    if (trial.good <= best) continue;
+    best = trial.good;
+    result.T_second_first = motion;
+    result.points = std::move(trial.points);
+    result.valid = std::move(trial.valid);
+    result.parallax_deg = trial.parallax_deg;
   }
+  const int candidates = static_cast<int>(std::count(inliers.begin(), inliers.end(), 1));
   const int valid = static_cast<int>(std::count(result.valid.begin(), result.valid.end(), 1));
-  if (best < std::max(options.min_points, candidates / 2)) {
+  if (best < std::max(options.min_points, candidates / 2))
     result.reason = "only " + std::to_string(best) + " of " + std::to_string(candidates) +
                     " points lie in front of both cameras";
-  } else if (second_best > 0.75 * best) {
+  else if (second_best > 0.75 * best)
     result.reason = "two motions explain the matches equally well";
-  } else if (result.parallax_deg < options.min_parallax_deg) {
+  else if (result.parallax_deg < options.min_parallax_deg)
     result.reason =
         "the camera has hardly moved sideways (parallax " + std::to_string(result.parallax_deg) + " deg)";
-  } else if (valid < options.min_points) {
+  else if (valid < options.min_points)
     result.reason = "only " + std::to_string(valid) + " points have a depth";
-  } else {
-    result.success = true;
-  }
+  result.success = result.reason.empty();
   return result;
 }
 

@@ -81,10 +81,16 @@ def further_names(statement):
     return [name.group(1) for name in found if name]
 
 
+def each(statement):
+    """A using-declaration of several names, as one of each."""
+    several = re.fullmatch(r"\s*using\s+([^=]*,[^=]*)", statement)
+    return ["using " + name.strip() for name in several.group(1).split(",")] if several else [statement]
+
+
 def definitions(path):
     """{name: its text where it is another name for something, which may be said twice in the same words}."""
     found = {}
-    for statement in statements(path.read_text()):
+    for statement in (one for several in statements(path.read_text()) for one in each(several)):
         name = name_of(statement)
         if name:
             words = " ".join(statement.replace(" tutti::", " ").split())
@@ -127,6 +133,7 @@ CASES = [
     ("Row", "using Row = std::vector<int>;", "using Row = std::vector<double>;"),
     ("At", "Pose At(double x, double turn = 0.0) { return Pose({x, 0, 0}); }", "double At(int i) { return i; }"),
     ("After", "struct First {};\nint After() { return 1; }", "void After() {}"),
+    ("Ice", "using testing::Snow, testing::Ice;", "int Ice() { return 0; }"),
     (None, "namespace fs = std::filesystem;\nusing testing::Snow;", "namespace fs = std::filesystem;\nusing tutti::testing::Snow;"),
     (None, "// int Same() {}\nconst char* one = \"int Same() {\";", "/* struct Same {}; */ const char* two = R\"(void Same() {})\";"),
     (None, "struct One { int Same() { return 1; } };", "struct Two { int Same() { return 2; } };"),

@@ -10,7 +10,6 @@
 
 namespace tutti {
 namespace {
-
 using testing::ErrorOf;
 using ::testing::HasSubstr;
 

@@ -1,4 +1,4 @@
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -15,10 +15,20 @@
 
 namespace tutti {
 namespace {
+using testing::FreshFolder, testing::SmallWorld, testing::With;
 
-using testing::FreshFolder;
-using testing::SmallWorld;
-using testing::With;
+SyntheticWorld RoomOf(int frames, std::uint64_t seed = 1) {
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
+  options.frames = frames;
+  options.seed = seed;
+  return SyntheticWorld(options);
+}
+
+SyntheticWriteOptions Forced() {
+  SyntheticWriteOptions options;
+  options.force = true;
+  return options;
+}
 
 TEST(SyntheticWriter, WrittenStereoTownIsReadBackByTheKittiReader) {
   SyntheticOptions options = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kStereo);
@@ -81,76 +91,60 @@ TEST(SyntheticWriter, SidesLookLeftAndRightAndAreNumberedInPairs) {
 }
 
 TEST(SyntheticWriter, AFullFolderIsRefusedUnlessForced) {
-  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
-  options.frames = 4;
   const auto folder = FreshFolder();
-  WriteSyntheticDataset(SyntheticWorld(options), folder);
-  options.frames = 2;
-  const SyntheticWorld shorter(options);
+  WriteSyntheticDataset(RoomOf(4), folder);
+  const SyntheticWorld shorter = RoomOf(2);
   EXPECT_THROW(WriteSyntheticDataset(shorter, folder), InputError);
-  SyntheticWriteOptions force;
-  force.force = true;
-  EXPECT_EQ(WriteSyntheticDataset(shorter, folder, force), 2U);
+  EXPECT_EQ(WriteSyntheticDataset(shorter, folder, Forced()), 2U);
   EXPECT_EQ(OpenDataset(folder, With(Sensor::kMono))->Size(), 2U);  // no old frames left
 }
 
 TEST(SyntheticWriter, ForceRemovesAndWritesNothingBehindALink) {
-  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
-  options.frames = 2;
-  const SyntheticWorld world(options);
+  const SyntheticWorld world = RoomOf(2);
   const auto folder = FreshFolder(), other = folder / "other", mine = folder / "mine";
   WriteSyntheticDataset(world, other);
   WriteSyntheticDataset(world, mine);
   std::filesystem::remove_all(mine / "image_0");
   std::filesystem::create_directory_symlink(other / "image_0", mine / "image_0");
-  SyntheticWriteOptions force;
-  force.force = true;
-  EXPECT_THROW(WriteSyntheticDataset(world, mine, force), InputError);
+  EXPECT_THROW(WriteSyntheticDataset(world, mine, Forced()), InputError);
   EXPECT_TRUE(std::filesystem::exists(other / "image_0" / "000001.png"));
   std::filesystem::remove(mine / "image_0");
   for (const char* name : {"config.yaml", "poses.txt"}) {
     std::filesystem::remove(mine / name);
     std::filesystem::create_symlink(other / name, mine / name);
   }
-  options.seed = 2;  // another text
   const auto written = std::filesystem::last_write_time(other / "config.yaml");
-  EXPECT_EQ(WriteSyntheticDataset(SyntheticWorld(options), mine, force), 2U);
+  EXPECT_EQ(WriteSyntheticDataset(RoomOf(2, 2), mine, Forced()), 2U);  // of another seed: another text
   EXPECT_FALSE(std::filesystem::is_symlink(mine / "config.yaml"));
   EXPECT_EQ(std::filesystem::last_write_time(other / "config.yaml"), written);
 }
 
 TEST(SyntheticWriter, AnotherOnesRecordingStaysWhateverItsConfigurationIs) {
-  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
-  options.frames = 2;
-  const SyntheticWorld world(options);
-  SyntheticWriteOptions force;
-  force.force = true;
+  const SyntheticWorld world = RoomOf(2);
   const auto folder = FreshFolder(), config = folder / "config.yaml",
              image = folder / "image_0" / "000000.png";
   std::filesystem::create_directories(folder / "image_0");
   std::ofstream(image) << "another one's";
-  EXPECT_THROW(WriteSyntheticDataset(world, folder, force), InputError);
+  EXPECT_THROW(WriteSyntheticDataset(world, folder, Forced()), InputError);
   ASSERT_EQ(mkfifo(config.c_str(), 0600), 0);  // opened, it would wait for ever
-  EXPECT_THROW(WriteSyntheticDataset(world, folder, force), InputError);
+  EXPECT_THROW(WriteSyntheticDataset(world, folder, Forced()), InputError);
   std::filesystem::remove(config);
   std::ofstream(config) << "#";
   std::filesystem::resize_file(config, std::uintmax_t{300} << 30);  // one line of zeros
-  EXPECT_THROW(WriteSyntheticDataset(world, folder, force), InputError);
+  EXPECT_THROW(WriteSyntheticDataset(world, folder, Forced()), InputError);
   EXPECT_EQ(std::filesystem::file_size(image), 13U);
   std::filesystem::remove(config);
   WriteSyntheticDataset(world, folder / "own");
   std::filesystem::copy(folder / "own" / "config.yaml", config);
-  EXPECT_EQ(WriteSyntheticDataset(world, folder, force), 2U);  // now it says that it is tutti's
+  EXPECT_EQ(WriteSyntheticDataset(world, folder, Forced()), 2U);  // now it says that it is tutti's
 }
 
 TEST(SyntheticWriter, StoppingKeepsACompleteBeginning) {
-  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
-  options.frames = 20;
   const auto folder = FreshFolder();
   SyntheticWriteOptions write;
   write.threads = 2;
   write.progress = [](std::size_t done, std::size_t) { return done < 3; };
-  const std::size_t written = WriteSyntheticDataset(SyntheticWorld(options), folder, write);
+  const std::size_t written = WriteSyntheticDataset(RoomOf(20), folder, write);
   EXPECT_GE(written, 3U);
   EXPECT_LT(written, 20U);
   const auto data = OpenDataset(folder, With(Sensor::kMono));

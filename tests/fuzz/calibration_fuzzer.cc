@@ -4,7 +4,7 @@
 #include <cstdlib>
 
 #include "apps/run/calibration_file.h"
-#include "frontend/dataset/sensor_yaml.h"
+#include "frontend/dataset/layout.h"
 #include "tests/fuzz/memory_file.h"
 #include "tutti/core/error.h"
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "frontend/dataset/image_file.h"
-#include "frontend/dataset/image_size.h"
 #include "tests/fuzz/memory_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

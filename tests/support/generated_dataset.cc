@@ -1,6 +1,6 @@
 #include "tests/support/generated_dataset.h"
 
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 #include "tests/support/made_once.h"
 #include "tests/support/rendered_world.h"
 

@@ -8,7 +8,6 @@
 
 #include "apps/export/colmap_model.h"
 #include "apps/export/keyframe_images.h"
-#include "apps/export/track_completion.h"
 #include "tests/apps/export/colmap_files.h"
 #include "tests/apps/export/mapped_room.h"
 #include "tests/support/test_data.h"
@@ -59,7 +58,7 @@ std::vector<std::size_t> All(const MapModel& model) {
   return all;
 }
 
-// As `tutti export --colmap` makes it, of all keyframes.
+// `tutti export --colmap` makes such a model; this one has all keyframes.
 ColmapModel ColmapOf(const testing::MappedRoom& room) {
   MapModel model = room.Model();
   RefineTracks(KeyframeImages(*room.dataset, model), All(model), &model);

@@ -12,8 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
-using testing::ReadAll;
-using testing::RunTutti;
+using testing::ReadAll, testing::RunTutti;
 
 SyntheticOptions SmallTown() {
   SyntheticOptions options;

@@ -1,4 +1,4 @@
-#include "apps/export/image_choice.h"
+#include "apps/export/keyframe_images.h"
 
 #include <gtest/gtest.h>
 

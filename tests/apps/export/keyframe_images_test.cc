@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "frontend/dataset/rectified_rig.h"
 #include "frontend/geometry/lens_error.h"
 #include "tests/apps/export/mapped_room.h"
 #include "tests/support/error_of.h"
@@ -20,15 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-PinholeCamera Camera() {
-  PinholeCamera camera;
-  camera.width = 96;
-  camera.height = 64;
-  camera.fx = camera.fy = 60;
-  camera.cx = 47.5;
-  camera.cy = 31.5;
-  return camera;
-}
+PinholeCamera Camera() { return Pinhole(60, 60, 47.5, 31.5, {96, 64}); }
 
 // Three images: red left of the middle and blue right of it; a fine grid; the same grid, blurred.
 std::unique_ptr<Dataset> ThreeImages(const fs::path& folder) {
@@ -55,10 +48,7 @@ MapModel ModelOfThree() {
   for (int i = 0; i < 3; ++i) model.keyframes.push_back({i, i, 0.1 * i, Pose(), {}});
   model.keyframes[0].views = {{5, {10, 10}}, {6, {80, 10}}, {7, {80, 30}}};
   model.keyframes[1].views = {{6, {0, 0}}};
-  model.landmarks = {{5, {0, 0, 1}, 1, {{128, 128, 128}}},
-                     {6, {0, 0, 1}, 2, {{128, 128, 128}}},
-                     {7, {0, 0, 1}, 1, {{128, 128, 128}}},
-                     {8, {0, 0, 1}, 1, {{128, 128, 128}}}};
+  for (const int id : {5, 6, 7, 8}) model.landmarks.push_back({id, {0, 0, 1}, id == 6 ? 2 : 1});
   return model;
 }
 

@@ -1,4 +1,4 @@
-#include "apps/export/nerf_transforms.h"
+#include "apps/export/map_files.h"
 
 #include <gtest/gtest.h>
 

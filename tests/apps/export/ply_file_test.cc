@@ -1,5 +1,5 @@
 // Landmarks and cameras as PLY, read by meshio.
-#include "apps/export/ply_file.h"
+#include "apps/export/map_files.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Views that are dropped, and views that are found in the images.
-#include "apps/export/track_completion.h"
+#include "apps/export/colmap_model.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "frontend/dataset/rectified_rig.h"
 #include "tests/apps/export/mapped_room.h"
 #include "tests/support/test_data.h"
 
@@ -34,12 +35,7 @@ class Wall : public ::testing::Test {
       cv::imwrite((folder / (std::to_string(k) + ".png")).string(), shifted);
     }
     DatasetOptions options;
-    options.camera = PinholeCamera();
-    options.camera->width = 200;
-    options.camera->height = 120;
-    options.camera->fx = options.camera->fy = kFocal;
-    options.camera->cx = 100;
-    options.camera->cy = 60;
+    options.camera = Pinhole(kFocal, kFocal, 100, 60, {200, 120});
     options.rate_hz = 10;
     dataset_ = OpenDataset(folder, options);
     model_.camera = *options.camera;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "apps/export/map_model.h"
+#include "frontend/dataset/rectified_rig.h"
 
 namespace tutti::testing {
 
@@ -12,12 +13,7 @@ namespace tutti::testing {
 /// second; 9 in (2, 1, 4), seen by both; 12 in (0, 0, 8), seen by the first alone. All views are exact.
 inline MapModel TwoCameras() {
   MapModel model;
-  model.camera.width = 640;
-  model.camera.height = 480;
-  model.camera.fx = 500;
-  model.camera.fy = 400;
-  model.camera.cx = 300;
-  model.camera.cy = 200;
+  model.camera = Pinhole(500, 400, 300, 200, {640, 480});
   const double half = std::sqrt(0.5);
   model.keyframes = {{0, 4, 0.4, Pose(), {}},
                      {3, 10, 1.0, Pose(Eigen::Quaterniond(half, 0, half, 0), Eigen::Vector3d(1, 2, 3)), {}}};

@@ -1,13 +1,12 @@
 // Box plots and densities with known answers, heat colours, panels.
-#include "apps/plot/plot_distribution.h"
+#include "apps/plot/plot.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "apps/plot/plot_heat.h"
-#include "apps/plot/plot_panels.h"
+#include "apps/plot/plot_lines.h"
 #include "apps/plot/plot_picture.h"
 
 namespace tutti {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "data/synthetic/synthetic_writer.h"
+#include "data/synthetic/synthetic_world.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/test_data.h"
 

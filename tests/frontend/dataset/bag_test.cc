@@ -19,9 +19,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::ErrorOf;
-using testing::FreshFile;
-using testing::FreshFolder;
+using testing::Difference, testing::ErrorOf, testing::FreshFile, testing::FreshFolder;
 using ::testing::HasSubstr;
 
 fs::path OfOthers(const std::string& name) {
@@ -47,7 +45,7 @@ std::size_t ImagesOf(const Bag& bag) {
     if (read.image.empty()) continue;
     const int i = static_cast<int>(message.stamp_s) - 100;
     EXPECT_DOUBLE_EQ(message.stamp_s, 100.5 + i);
-    EXPECT_EQ(cv::norm(read.image, testing::Picture(16, 12, i), cv::NORM_INF), 0);
+    EXPECT_EQ(Difference(read.image, testing::Picture(16, 12, i)), 0);
     ++count;
   }
   return count;
@@ -71,7 +69,7 @@ TEST_P(EveryFormat, OfOthersIsRead) {
   ASSERT_EQ(compressed.size(), 3u);
   const MessageImage picture = DecodeImageMessage(bag->Read(compressed[2]), "sensor_msgs/CompressedImage",
                                                   Serialization::kCdr, Pixels::kGrey);
-  EXPECT_EQ(cv::norm(picture.image, testing::Picture(16, 12, 1), cv::NORM_INF), 0) << picture.error;
+  EXPECT_EQ(Difference(picture.image, testing::Picture(16, 12, 1)), 0) << picture.error;
   const CameraInfo info =
       DecodeCameraInfo(bag->Read(bag->Messages("/left/camera_info").at(1)), Serialization::kCdr, "x.mcap");
   EXPECT_EQ(info.Raw("").fy, 21);
@@ -177,7 +175,7 @@ TEST(Bag, ARecordingInPartsIsOneInTheOrderOfTheirNumbers) {
   EXPECT_THAT(with_damage->damage(), AllOf(HasSubstr("a part is skipped: "), HasSubstr("recording_11.mcap")));
 }
 
-// As 'ros2 bag record --compression-mode message' leaves it.
+// 'ros2 bag record --compression-mode message' leaves such a file.
 TEST(Bag, MessagesThatAreCompressedEachForItselfAreUnpacked) {
   const fs::path file = FreshFolder() / "packed.db3";
   fs::copy_file(OfOthers("sqlite.db3"), file);
@@ -207,8 +205,8 @@ TEST(Bag, MessagesThatAreCompressedEachForItselfAreUnpacked) {
     const ReadResult a = packed->Read(i), b = plain->Read(i);
     ASSERT_TRUE(a.frame && b.frame) << a.error << b.error;
     EXPECT_EQ(a.frame->stamp_s, b.frame->stamp_s);
-    EXPECT_EQ(cv::norm(a.frame->image, b.frame->image, cv::NORM_INF), 0);
-    EXPECT_EQ(cv::norm(a.frame->right, b.frame->right, cv::NORM_INF), 0);
+    EXPECT_EQ(Difference(a.frame->image, b.frame->image), 0);
+    EXPECT_EQ(Difference(a.frame->right, b.frame->right), 0);
   }
 }
 
@@ -238,7 +236,7 @@ TEST(Bag, WhatIsNoneIsRefused) {
   EXPECT_THAT(Bag::Open(holes)->damage(), HasSubstr("at byte 8"));
 }
 
-// As the fuzzer found one: SQLite would have walked through it for as long as one had patience.
+// The fuzzer found such a file: SQLite would have walked through it for as long as one had patience.
 TEST(Bag, ADatabaseWhosePagesAreARingEnds) {
   EXPECT_THAT(Bag::Open(OfOthers("ring.db3"))->damage(), HasSubstr("rows are not in their order"));
 }

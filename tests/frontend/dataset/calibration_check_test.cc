@@ -6,6 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "frontend/dataset/rectified_rig.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/test_data.h"
 
@@ -45,16 +46,6 @@ const Town& StereoTown() {
   return town;
 }
 
-PinholeCamera Pinhole(int width, int height, double f, double cx, double cy) {
-  PinholeCamera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = camera.fy = f;
-  camera.cx = cx;
-  camera.cy = cy;
-  return camera;
-}
-
 std::string Advice(const CalibrationReport& report) {
   return report.findings.empty() ? "" : report.findings.front().advice;
 }
@@ -92,19 +83,17 @@ TEST(CalibrationCheck, PairsThatAreNotRectifiedAreSeen) {
 }
 
 TEST(CalibrationCheck, ImplausibleLensesAreSeen) {
-  CameraRig rig = StereoTown().rig;
-  rig.camera.fx = rig.camera.fy = 4.5;  // millimetres
-  EXPECT_THAT(Advice(CheckCalibration(rig, {})), HasSubstr("in pixels"));
-  rig = StereoTown().rig;
-  rig.camera.fx *= 12;
-  rig.camera.fy *= 12;
-  EXPECT_THAT(Advice(CheckCalibration(rig, {})), HasSubstr("this very image size"));
-  rig = StereoTown().rig;
-  rig.camera.fy *= 2;
-  EXPECT_THAT(Advice(CheckCalibration(rig, {})), HasSubstr("almost square"));
-  rig = StereoTown().rig;
-  rig.camera.cx *= 1.6;  // of a wider image
-  EXPECT_THAT(Advice(CheckCalibration(rig, {})), HasSubstr("another image size"));
+  const PinholeCamera& c = StereoTown().rig.camera;
+  const cv::Size size(c.width, c.height);
+  for (const auto& [camera, advice] :
+       {std::pair(Pinhole(4.5, 4.5, c.cx, c.cy, size), "in pixels"),  // millimetres
+        {Pinhole(12 * c.fx, 12 * c.fy, c.cx, c.cy, size), "this very image size"},
+        {Pinhole(c.fx, 2 * c.fy, c.cx, c.cy, size), "almost square"},
+        {Pinhole(c.fx, c.fy, 1.6 * c.cx, c.cy, size), "another image size"}}) {  // of a wider image
+    CameraRig rig = StereoTown().rig;
+    rig.camera = camera;
+    EXPECT_THAT(Advice(CheckCalibration(rig, {})), HasSubstr(advice));
+  }
 }
 
 TEST(CalibrationCheck, WrongDepthUnitsAreSeen) {
@@ -139,10 +128,10 @@ TEST(CalibrationCheck, RealSetsPass) {
   EXPECT_GT(pairs.same_row, 0.9);
   DatasetOptions rgbd;
   rgbd.sensor = Sensor::kRgbd;
-  rgbd.camera = Pinhole(640, 480, 520, 318, 236);
+  rgbd.camera = Pinhole(520, 520, 318, 236, {640, 480});
   EXPECT_EQ(Advice(CheckCalibration(*OpenDataset(kitchen, rgbd))), "");
   DatasetOptions mono;
-  mono.camera = Pinhole(1241, 376, 718.856, 607.1928, 185.2157);
+  mono.camera = Pinhole(718.856, 718.856, 607.1928, 185.2157, {1241, 376});
   EXPECT_EQ(Advice(CheckCalibration(*OpenDataset(kitti, mono))), "");
 }
 

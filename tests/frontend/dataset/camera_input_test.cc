@@ -12,11 +12,8 @@
 
 namespace tutti {
 namespace {
-
-using testing::ErrorOf;
-using testing::FreshFolder;
+using testing::ErrorOf, testing::FreshFolder, testing::WriteImage;
 using ::testing::HasSubstr;
-using testing::WriteImage;
 
 // A device whose queue holds images that were taken at these times.
 class QueueOfImages {

@@ -12,20 +12,11 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using testing::FreshFolder;
-using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::Picture;
-using testing::With;
-using testing::WriteImage;
+using ::testing::AllOf, ::testing::ElementsAre, ::testing::HasSubstr;
+using testing::Difference, testing::FrameOf, testing::FreshFolder, testing::OpenError, testing::Picture,
+    testing::With, testing::WriteImage;
 
 bool NeverStop() { return false; }
-
-double MostDifference(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
-}
 
 // Without loss. False if this OpenCV can't.
 bool WriteVideo(const fs::path& file, const std::vector<cv::Mat>& images) {
@@ -79,8 +70,8 @@ TEST_F(CameraPair, OfRectifiedFilesGivesTheFramesOfAFolder) {
     ASSERT_TRUE(read.frame.has_value()) << read.error;
     EXPECT_EQ(read.depth_error, "");
     EXPECT_NEAR(read.frame->stamp_s, static_cast<double>(i) / 25, 1e-9);
-    EXPECT_EQ(MostDifference(read.frame->image, other.frame->image), 0);
-    EXPECT_EQ(MostDifference(read.frame->right, other.frame->right), 0);
+    EXPECT_EQ(Difference(read.frame->image, other.frame->image), 0);
+    EXPECT_EQ(Difference(read.frame->right, other.frame->right), 0);
   }
   EXPECT_FALSE(live->WaitFor(5, NeverStop));
   EXPECT_THAT(live->Read(0).error, HasSubstr("come once"));
@@ -100,11 +91,10 @@ TEST_F(CameraPair, InOneImageIsCutInTheMiddle) {
   EXPECT_EQ(dataset->Rig().baseline_m, 0.5);
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(dataset->WaitFor(static_cast<std::size_t>(i), NeverStop));
-    const ReadResult read = dataset->Read(static_cast<std::size_t>(i));
-    ASSERT_TRUE(read.frame.has_value()) << read.error;
-    EXPECT_EQ(MostDifference(read.frame->image, Picture(64, 48, i)), 0);
-    EXPECT_EQ(MostDifference(read.frame->right, Picture(64, 48, 100 + i)), 0);
-    EXPECT_EQ(read.frame->mask.size(), cv::Size(64, 48));
+    const InputFrame read = FrameOf(*dataset, static_cast<std::size_t>(i));
+    EXPECT_EQ(Difference(read.image, Picture(64, 48, i)), 0);
+    EXPECT_EQ(Difference(read.right, Picture(64, 48, 100 + i)), 0);
+    EXPECT_EQ(read.mask.size(), cv::Size(64, 48));
   }
 }
 
@@ -120,11 +110,7 @@ TEST_F(CameraPair, OfASingleImageCutInTheMiddleIsTold) {
 // Two cameras with lenses, turned against each other, that see bright points.
 struct RawPair {
   RawPair() {
-    left.width = 320;
-    left.height = 240;
-    left.fx = left.fy = 200;
-    left.cx = 158;
-    left.cy = 121;
+    left = Pinhole(200, 200, 158, 121, {320, 240});
     left.distortion = Distortion::kRadTan;
     left.coefficients = {-0.2, 0.05, 0.001, -0.001, 0};
     right = left;
@@ -186,14 +172,13 @@ TEST_F(CameraPair, ThatIsRawIsRectifiedSoThatRowsAgree) {
   const CameraRig& rig = dataset->Rig();
   EXPECT_NEAR(rig.baseline_m, pair.T_right_left.translation.norm(), 1e-9);
   EXPECT_EQ(rig.camera.distortion, Distortion::kNone);
-  const ReadResult read = dataset->Read(0);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
+  const InputFrame read = FrameOf(*dataset, 0);
   for (const Eigen::Vector3d& point : pair.points) {
     const Eigen::Vector3d rectified = rig.T_body_camera.Inverse() * point;
     const Eigen::Vector2d wanted = rig.camera.Project(rectified);
     const Eigen::Vector2d disparity(rig.camera.fx * rig.baseline_m / rectified.z(), 0);
-    const Eigen::Vector2d left = Middle(read.frame->image, wanted);
-    const Eigen::Vector2d right = Middle(read.frame->right, wanted - disparity);
+    const Eigen::Vector2d left = Middle(read.image, wanted);
+    const Eigen::Vector2d right = Middle(read.right, wanted - disparity);
     EXPECT_NEAR((left - wanted).norm(), 0, 0.3) << wanted.transpose();
     EXPECT_NEAR((right - wanted + disparity).norm(), 0, 0.3) << wanted.transpose();
     EXPECT_NEAR(left.y(), right.y(), 0.2);
@@ -214,13 +199,12 @@ TEST_F(CameraPair, OfColourAndDepthIsInMetres) {
   EXPECT_EQ(dataset->Rig().max_depth_m, 20);
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(dataset->WaitFor(static_cast<std::size_t>(i), NeverStop));
-    const ReadResult read = dataset->Read(static_cast<std::size_t>(i));
-    ASSERT_TRUE(read.frame.has_value()) << read.error;
-    EXPECT_EQ(MostDifference(read.frame->image, Picture(64, 48, i)), 0);
-    EXPECT_TRUE(read.frame->right.empty());
-    ASSERT_EQ(read.frame->depth_m.type(), CV_32FC1);
-    EXPECT_FLOAT_EQ(read.frame->depth_m.at<float>(2, 5), 5.0F + 0.001F * static_cast<float>(i));
-    EXPECT_EQ(read.frame->depth_m.at<float>(3, 5), 0) << "is beyond max_depth_m";
+    const InputFrame read = FrameOf(*dataset, static_cast<std::size_t>(i));
+    EXPECT_EQ(Difference(read.image, Picture(64, 48, i)), 0);
+    EXPECT_TRUE(read.right.empty());
+    ASSERT_EQ(read.depth_m.type(), CV_32FC1);
+    EXPECT_FLOAT_EQ(read.depth_m.at<float>(2, 5), 5.0F + 0.001F * static_cast<float>(i));
+    EXPECT_EQ(read.depth_m.at<float>(3, 5), 0) << "is beyond max_depth_m";
   }
   options.rotate = 90;
   const auto turned = OpenDataset(Name("left.mkv", "depth"), options);
@@ -252,8 +236,7 @@ TEST_F(CameraPair, WithAFileThatHasACommaInItsNameIsOneFile) {
   const std::string name = "camera:" + (folder_ / "a,b.mkv").string();
   EXPECT_THAT(CameraSources(name), ElementsAre((folder_ / "a,b.mkv").string()));
   EXPECT_EQ(
-      MostDifference(OpenDataset(name, With(Sensor::kMono, true))->Read(0).frame->image, Picture(64, 48, 7)),
-      0);
+      Difference(OpenDataset(name, With(Sensor::kMono, true))->Read(0).frame->image, Picture(64, 48, 7)), 0);
 }
 
 TEST_F(CameraPair, ThatDoesNotFitTogetherIsRefused) {

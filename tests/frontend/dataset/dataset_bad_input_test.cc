@@ -3,29 +3,17 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
-
 #include "gmock/gmock.h"
 #include "tests/frontend/dataset/dataset_files.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
 namespace {
+using ::testing::AllOf, ::testing::HasSubstr;
+using testing::Difference, testing::FreshFolder, testing::MakeKitti, testing::OpenError, testing::Picture,
+    testing::Truncate, testing::With, testing::WriteImage, testing::WriteText;
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using tutti::testing::FreshFolder;
-using tutti::testing::MakeKitti;
-using tutti::testing::OpenError;
-using tutti::testing::Picture;
-using tutti::testing::Truncate;
-using tutti::testing::With;
-using tutti::testing::WriteImage;
-using tutti::testing::WriteText;
-
-const std::string kNone = "";
+const std::string kNone = "no error";
 
 TEST(DatasetBadInputTest, MissingAndEmptyFoldersAreNamed) {
   const auto folder = FreshFolder();
@@ -72,15 +60,9 @@ TEST(DatasetBadInputTest, DamagedBytesInsideAPngAreAnErrorOfTheirFrame) {
 
 TEST(DatasetBadInputTest, TruncatedVideoGivesItsFramesAndThenErrors) {
   const auto file = FreshFolder() / "clip.avi";
-  {
-    cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
-    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
-    for (int i = 0; i < 30; ++i) {
-      cv::Mat frame;
-      cv::cvtColor(Picture(64, 48, i), frame, cv::COLOR_GRAY2BGR);
-      writer.write(frame);
-    }
-  }
+  std::vector<cv::Mat> images;
+  for (int i = 0; i < 30; ++i) images.push_back(Picture(64, 48, i));
+  if (!testing::WriteMotionJpeg(file, images)) GTEST_SKIP() << "this OpenCV can't write a video";
   Truncate(file, 0.6);
   std::unique_ptr<Dataset> data;
   try {
@@ -159,12 +141,14 @@ TEST(DatasetBadInputTest, MissingOrWrongCalibration) {
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("calib.txt"), HasSubstr("camera:")));
   EXPECT_EQ(OpenError(folder, With(Sensor::kMono, true)), kNone);
   EXPECT_THAT(OpenError(folder, With(Sensor::kStereo, true)), HasSubstr("baseline_m"));
-  WriteText(folder / "calib.txt", "P0: 1 2 3\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("calib.txt:1: "));
-  WriteText(folder / "calib.txt", "P0: 100 0 32 0 0 nan 24 0 0 0 1 0\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("calib.txt:1: "), HasSubstr("nan")));
-  WriteText(folder / "calib.txt", "P7: 100 0 32 0 0 100 24 0 0 0 1 0\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("P0"));
+  const auto error = [&](const std::string& calibration) {
+    WriteText(folder / "calib.txt", calibration);
+    return OpenError(folder, With(Sensor::kMono));
+  };
+  EXPECT_THAT(error("P0: 1 2 3\n"), HasSubstr("calib.txt:1: "));
+  EXPECT_THAT(error("P0: 100 0 32 0 0 nan 24 0 0 0 1 0\n"),
+              AllOf(HasSubstr("calib.txt:1: "), HasSubstr("nan")));
+  EXPECT_THAT(error("P7: 100 0 32 0 0 100 24 0 0 0 1 0\n"), HasSubstr("P0"));
   DatasetOptions other = With(Sensor::kMono, true);
   other.camera->width = 640;
   EXPECT_THAT(OpenError(folder, other), AllOf(HasSubstr("640x48"), HasSubstr("64x48")));
@@ -174,24 +158,17 @@ TEST(DatasetBadInputTest, WrongNumberOfPosesAndNaN) {
   const auto folder = FreshFolder();
   MakeKitti(folder, 3, false);
   const auto data = OpenDataset(folder, With(Sensor::kMono));
-  const auto error = [&] {
-    try {
-      data->ReadGroundTruth(folder / "poses.txt", nullptr);
-    } catch (const InputError& e) {
-      return std::string(e.what());
-    }
-    return kNone;
-  };
-  EXPECT_EQ(error(), kNone);
   const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  WriteText(folder / "poses.txt", pose + pose);
-  EXPECT_THAT(error(), AllOf(HasSubstr("poses.txt"), HasSubstr("2 poses"), HasSubstr("3 frames")));
-  WriteText(folder / "poses.txt", pose + pose + pose + pose);
-  EXPECT_THAT(error(), HasSubstr("4 poses"));
-  WriteText(folder / "poses.txt", pose + "1 0 0 nan 0 1 0 0 0 0 1 0\n" + pose);
-  EXPECT_THAT(error(), AllOf(HasSubstr("poses.txt:2: "), HasSubstr("nan")));
-  WriteText(folder / "poses.txt", "");
-  EXPECT_THAT(error(), HasSubstr("no pose"));
+  const auto error = [&](const std::string& poses) {
+    WriteText(folder / "poses.txt", poses);
+    return testing::ErrorOf([&] { data->ReadGroundTruth(folder / "poses.txt", nullptr); });
+  };
+  EXPECT_EQ(error(pose + pose + pose), kNone);
+  EXPECT_THAT(error(pose + pose), AllOf(HasSubstr("poses.txt"), HasSubstr("2 poses"), HasSubstr("3 frames")));
+  EXPECT_THAT(error(pose + pose + pose + pose), HasSubstr("4 poses"));
+  EXPECT_THAT(error(pose + "1 0 0 nan 0 1 0 0 0 0 1 0\n" + pose),
+              AllOf(HasSubstr("poses.txt:2: "), HasSubstr("nan")));
+  EXPECT_THAT(error(""), HasSubstr("no pose"));
 }
 
 TEST(DatasetBadInputTest, TimeStampsMustGrow) {
@@ -202,15 +179,15 @@ TEST(DatasetBadInputTest, TimeStampsMustGrow) {
   ASSERT_EQ(data->Size(), 3U);
   EXPECT_THAT(data->Warnings()[0], AllOf(HasSubstr("times.txt:3: "), HasSubstr("skipped")));
   EXPECT_EQ(data->Read(2).frame->index, 2);  // what is skipped has no number
-  EXPECT_EQ(cv::norm(data->Read(2).frame->image, Picture(64, 48, 3), cv::NORM_INF), 0);
+  EXPECT_EQ(Difference(data->Read(2).frame->image, Picture(64, 48, 3)), 0);
   EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 3U);
-  WriteText(folder / "times.txt", "0\n0.2\n0.1\n0.3\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("times.txt:3: "), HasSubstr("sort")));
-  WriteText(folder / "times.txt", "0\n0.1\nnan\n0.3\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("times.txt:3: "));
-  WriteText(folder / "times.txt", "0\n0.1\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)),
-              AllOf(HasSubstr("2 time stamps"), HasSubstr("number 3")));
+  const auto error = [&](const std::string& times) {
+    WriteText(folder / "times.txt", times);
+    return OpenError(folder, With(Sensor::kMono));
+  };
+  EXPECT_THAT(error("0\n0.2\n0.1\n0.3\n"), AllOf(HasSubstr("times.txt:3: "), HasSubstr("sort")));
+  EXPECT_THAT(error("0\n0.1\nnan\n0.3\n"), HasSubstr("times.txt:3: "));
+  EXPECT_THAT(error("0\n0.1\n"), AllOf(HasSubstr("2 time stamps"), HasSubstr("number 3")));
 }
 
 TEST(DatasetBadInputTest, TumListsAreChecked) {
@@ -235,14 +212,15 @@ TEST(DatasetBadInputTest, TumListsAreChecked) {
   EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd, true)),
               AllOf(HasSubstr("depth.txt"), HasSubstr("lists no images")));
   WriteText(folder / "depth.txt", "1.0 depth/a.png\n");
-  WriteText(folder / "rgb.txt", "2.0 rgb/a.png\n1.0 rgb/b.png\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono, true)), HasSubstr("rgb.txt:2: "));
-  WriteText(folder / "rgb.txt", "1.0 rgb/a.png\n1.0 rgb/b.png\n");
+  const auto error = [&](const std::string& list) {
+    WriteText(folder / "rgb.txt", list);
+    return OpenError(folder, With(Sensor::kMono, true));
+  };
+  EXPECT_THAT(error("2.0 rgb/a.png\n1.0 rgb/b.png\n"), HasSubstr("rgb.txt:2: "));
+  EXPECT_THAT(error("1.0\n"), HasSubstr("rgb.txt:1: "));
+  EXPECT_THAT(error(""), HasSubstr("lists no images"));
+  EXPECT_EQ(error("1.0 rgb/a.png\n1.0 rgb/b.png\n"), kNone);
   EXPECT_THAT(OpenDataset(folder, With(Sensor::kMono, true))->Warnings()[0], HasSubstr("rgb.txt:2: "));
-  WriteText(folder / "rgb.txt", "1.0\n");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono, true)), HasSubstr("rgb.txt:1: "));
-  WriteText(folder / "rgb.txt", "");
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono, true)), HasSubstr("lists no images"));
 }
 
 TEST(DatasetBadInputTest, EurocSensorYamlIsChecked) {
@@ -277,16 +255,14 @@ TEST(DatasetBadInputTest, EurocSensorYamlIsChecked) {
   EXPECT_THAT(pair->Warnings().back(), HasSubstr("1 of 2 left images have no right image"));
   EXPECT_FALSE(pair->Read(0).frame->right.empty());
   EXPECT_TRUE(pair->Read(1).frame->right.empty());
-  WriteText(camera / "sensor.yaml", replaced("[60, 60, 32, 24]", "[60, 60]"));
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("sensor.yaml:11: "));
-  WriteText(camera / "sensor.yaml", replaced("equidistant", "omni"));
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("omni"));
-  WriteText(camera / "sensor.yaml", replaced("[1.0, 0.0", "[0.0, 0.0"));
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("T_BS"));
-  WriteText(camera / "sensor.yaml", replaced("[1.0, 0.0, 0.0, 0.5,", "[1e200, 1e200, 0.0, 0.5,"));
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("T_BS"));
-  WriteText(camera / "sensor.yaml", replaced("[64, 48]", "[1e300, 48]"));
-  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("camera.width"));
+  for (const auto& [from, to, error] : {std::array{"[60, 60, 32, 24]", "[60, 60]", "sensor.yaml:11: "},
+                                        {"equidistant", "omni", "omni"},
+                                        {"[1.0, 0.0", "[0.0, 0.0", "T_BS"},
+                                        {"[1.0, 0.0, 0.0, 0.5,", "[1e200, 1e200, 0.0, 0.5,", "T_BS"},
+                                        {"[64, 48]", "[1e300, 48]", "camera.width"}}) {
+    WriteText(camera / "sensor.yaml", replaced(from, to));
+    EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr(error));
+  }
   WriteText(camera / "sensor.yaml", good);
   WriteText(camera / "data.csv", "12x,a.png\n");
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("data.csv:1: "));

@@ -12,13 +12,9 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FreshFolder;
+using testing::Difference, testing::FrameOf, testing::FreshFolder, testing::ImageMessage, testing::OpenError,
+    testing::Picture, testing::With;
 using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::With;
-
-using testing::ImageMessage;
-using testing::Picture;
 
 const fs::path& FourFrames() {
   static const fs::path file = [] {
@@ -37,9 +33,7 @@ const fs::path& FourFrames() {
                 testing::CameraInfoMessage({64, 48}, {60, 0, 32, 0, 60, 24, 0, 0, 1}, "plumb_bob", {}));
     }
     bag.Write("/grey/image", type, ImageMessage(Picture(64, 48, 9, CV_16UC1), "mono16", 100.3));  // again
-    fs::path path = FreshFolder() / "test.bag";
-    testing::WriteText(path, bag.Finish());
-    return path;
+    return testing::FreshFile("test.bag", bag.Finish());
   }();
   return file;
 }
@@ -57,10 +51,9 @@ TEST(BagDataset, ColourWithStampsOfTheHeadersAndTheCameraInfo) {
   EXPECT_TRUE(dataset->Rig().calibrated);
   EXPECT_DOUBLE_EQ(dataset->Rig().camera.fx, 60);
   EXPECT_NEAR(dataset->Rig().rate_hz, 10, 1e-3);
-  const ReadResult read = dataset->Read(1);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(read.frame->image.type(), CV_8UC1);
-  EXPECT_NEAR(read.frame->image.at<unsigned char>(10, 10), 0.114 * 200, 1);
+  const InputFrame read = FrameOf(*dataset, 1);
+  EXPECT_EQ(read.image.type(), CV_8UC1);
+  EXPECT_NEAR(read.image.at<unsigned char>(10, 10), 0.114 * 200, 1);
   const ColourImage colour = dataset->ReadColour(1);
   ASSERT_EQ(colour.image.type(), CV_8UC3) << colour.error;
   EXPECT_EQ(colour.image.at<cv::Vec3b>(10, 10), cv::Vec3b(200, 0, 0));
@@ -72,9 +65,8 @@ TEST(BagDataset, SixteenBitIsScaledAndRepeatedStampsAreSkipped) {
   ASSERT_EQ(dataset->Size(), 4u);
   EXPECT_FALSE(dataset->Rig().calibrated);
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("repeat a time stamp"));
-  const ReadResult read = dataset->Read(2);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
+  const InputFrame read = FrameOf(*dataset, 2);
+  EXPECT_EQ(Difference(read.image, Picture(64, 48, 2)), 0);
 }
 
 TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
@@ -85,10 +77,9 @@ TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 images of /colour/image_raw have no depth"));
   ASSERT_TRUE(dataset->Read(2).frame.has_value());
   EXPECT_TRUE(dataset->Read(2).frame->depth_m.empty());
-  const ReadResult read = dataset->Read(3);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(read.frame->index, 3);
-  EXPECT_FLOAT_EQ(read.frame->depth_m.at<float>(5, 5), 1.5F);
+  const InputFrame read = FrameOf(*dataset, 3);
+  EXPECT_EQ(read.index, 3);
+  EXPECT_FLOAT_EQ(read.depth_m.at<float>(5, 5), 1.5F);
 }
 
 TEST(BagDataset, TopicsThatAreMissingAreListed) {
@@ -104,14 +95,13 @@ TEST(BagDataset, StereoPairsAreTakenAsTheyAreOrRectifiedWithTheRightCamera) {
     bag.Write("/left", "sensor_msgs/Image", ImageMessage(Picture(64, 48, i), "mono8", 100 + i));
     bag.Write("/right", "sensor_msgs/Image", ImageMessage(Picture(64, 48, 50 + i), "mono8", 100 + i));
   }
-  const fs::path file = FreshFolder() / "pairs.bag";
-  testing::WriteText(file, bag.Finish());
+  const fs::path file = testing::FreshFile("pairs.bag", bag.Finish());
   DatasetOptions options = Topic("/left", Sensor::kStereo);
   options.right_topic = "/right";
   options.camera = testing::SmallCamera();
   EXPECT_THAT(OpenError(file, options), HasSubstr("camera.baseline_m"));
   options.baseline_m = 0.5;
-  EXPECT_EQ(cv::norm(OpenDataset(file, options)->Read(1).frame->right, Picture(64, 48, 51), cv::NORM_INF), 0);
+  EXPECT_EQ(Difference(OpenDataset(file, options)->Read(1).frame->right, Picture(64, 48, 51)), 0);
   options.baseline_m = 0;
   options.camera->distortion = Distortion::kRadTan;
   options.camera->coefficients = {-0.1, 0, 0, 0, 0};
@@ -120,7 +110,7 @@ TEST(BagDataset, StereoPairsAreTakenAsTheyAreOrRectifiedWithTheRightCamera) {
   options.T_right_left = {1, 0, 0, -0.2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   const auto raw = OpenDataset(file, options);
   EXPECT_NEAR(raw->Rig().baseline_m, 0.2, 1e-9);
-  EXPECT_GT(cv::norm(raw->Read(1).frame->right, Picture(64, 48, 51), cv::NORM_INF), 0);
+  EXPECT_GT(Difference(raw->Read(1).frame->right, Picture(64, 48, 51)), 0);
 }
 
 // Two frames of 64x48 px of two cameras, with what their camera_infos say.
@@ -133,9 +123,7 @@ fs::path PairsWithInfo(const std::string& images, const CameraInfo& left, const 
                 testing::CameraInfoMessage(info));
     }
   }
-  const fs::path file = FreshFolder() / "pairs.bag";
-  testing::WriteText(file, bag.Finish());
-  return file;
+  return testing::FreshFile("pairs.bag", bag.Finish());
 }
 
 CameraInfo SmallInfo(double baseline_m) {
@@ -159,12 +147,12 @@ TEST(BagDataset, PairsHaveTheirCamerasFromBothCameraInfos) {
   const auto raw =
       OpenDataset(PairsWithInfo("image_raw", SmallInfo(0), SmallInfo(0.2)), options("image_raw"));
   EXPECT_NEAR(raw->Rig().baseline_m, 0.2, 1e-9);
-  EXPECT_GT(cv::norm(raw->Read(1).frame->right, Picture(64, 48, 1), cv::NORM_INF), 0) << "rectified";
+  EXPECT_GT(Difference(raw->Read(1).frame->right, Picture(64, 48, 1)), 0) << "rectified";
   const fs::path rectified = PairsWithInfo("image_rect", SmallInfo(0), SmallInfo(0.2));
   const auto pairs = OpenDataset(rectified, options("image_rect"));
   EXPECT_NEAR(pairs->Rig().baseline_m, 0.2, 1e-9);
   EXPECT_EQ(pairs->Rig().camera.fx, 50) << "P, not K";
-  EXPECT_EQ(cv::norm(pairs->Read(1).frame->image, Picture(64, 48, 1), cv::NORM_INF), 0);
+  EXPECT_EQ(Difference(pairs->Read(1).frame->image, Picture(64, 48, 1)), 0);
   EXPECT_THAT(pairs->Warnings().front(), HasSubstr("/left/camera_info, P, as the images are rectified"));
   EXPECT_THAT(OpenError(PairsWithInfo("image_raw", SmallInfo(0.2), SmallInfo(0)), options("image_raw")),
               HasSubstr("/right/image_raw is the left camera"));
@@ -200,9 +188,7 @@ fs::path WithStamps(const std::vector<double>& stamps_s) {
     bag.Write("/depth", "sensor_msgs/Image", ImageMessage(depth, "16UC1", 9 + 0.1 * static_cast<double>(i)),
               received_s + 0.01);
   }
-  fs::path path = FreshFolder() / "stamps.bag";
-  testing::WriteText(path, bag.Finish());
-  return path;
+  return testing::FreshFile("stamps.bag", bag.Finish());
 }
 
 TEST(BagDataset, StampsThatJumpBackAreRefusedWithThePlace) {
@@ -245,10 +231,7 @@ TEST(BagDataset, ImagesOfADamagedChunkAreSkippedAndCounted) {
   for (int i = 0; i < 2; ++i) chunk = bytes.find("compression=lz4", chunk + 1);
   ASSERT_NE(chunk, std::string::npos);
   for (std::size_t i = 60; i < 160; ++i) bytes[chunk + i] = '\xff';
-  const fs::path file = FreshFolder() / "damaged.bag";
-  testing::WriteText(file, bytes);
-
-  const auto dataset = OpenDataset(file, Topic("/image"));
+  const auto dataset = OpenDataset(testing::FreshFile("damaged.bag", bytes), Topic("/image"));
   ASSERT_EQ(dataset->Size(), 3u);
   EXPECT_DOUBLE_EQ(dataset->Stamp(1), 102);
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 images of /image can't be read"));
@@ -261,9 +244,8 @@ TEST(BagDataset, TheMaskIsOfEveryFrame) {
   mask.rowRange(40, 48).setTo(0);
   options.mask = FreshFolder() / "mask.png";
   testing::WriteImage(options.mask, mask);
-  const ReadResult read = OpenDataset(FourFrames(), options)->Read(1);
-  ASSERT_TRUE(read.frame.has_value()) << read.error;
-  EXPECT_EQ(cv::countNonZero(read.frame->mask != mask), 0);
+  const InputFrame read = FrameOf(*OpenDataset(FourFrames(), options), 1);
+  EXPECT_EQ(cv::countNonZero(read.mask != mask), 0);
 }
 
 TEST(BagDataset, OfRos2ByItsFileAndByItsFolder) {
@@ -280,14 +262,10 @@ TEST(BagDataset, OfRos2ByItsFileAndByItsFolder) {
   }
   DatasetOptions stereo = Topic("/left/image", Sensor::kStereo);
   stereo.right_topic = "/right/image/compressed";
-  stereo.camera = testing::SmallCamera();
-  stereo.camera->width = 16;
-  stereo.camera->height = 12;
-  stereo.camera->cx = 8;
-  stereo.camera->cy = 6;
+  stereo.camera = Pinhole(60, 60, 8, 6, {16, 12});
   stereo.baseline_m = 0.5;
   const auto pairs = OpenDataset(folder, stereo);
-  EXPECT_EQ(cv::norm(pairs->Read(0).frame->right, Picture(16, 12, 1), cv::NORM_INF), 0);
+  EXPECT_EQ(Difference(pairs->Read(0).frame->right, Picture(16, 12, 1)), 0);
   DatasetOptions images = Topic("/left/image");
   images.type = DatasetType::kImages;
   EXPECT_THAT(OpenError(folder, images), HasSubstr("holds bags of ROS 2"));

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "tests/frontend/dataset/dataset_files.h"
 #include "tests/support/test_data.h"
@@ -13,6 +12,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::Difference;
 using ::testing::HasSubstr;
 
 // Blue grows to the right, green downwards, red with the number.
@@ -26,19 +26,13 @@ cv::Mat Colourful(int number) {
   return image;
 }
 
-DatasetOptions ColourOptions() {
-  DatasetOptions options;
-  options.camera = testing::SmallCamera();
-  return options;
-}
+DatasetOptions ColourOptions() { return testing::With(Sensor::kMono, true); }
 
 fs::path FolderOfThree() {
   fs::path folder = testing::FreshFolder();
   for (int i = 0; i < 3; ++i) testing::WriteImage(folder / (std::to_string(i) + ".png"), Colourful(i));
   return folder;
 }
-
-double Difference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF); }
 
 TEST(ReadColour, HasTheColoursOfTheFile) {
   const auto dataset = OpenDataset(FolderOfThree(), ColourOptions());
@@ -92,11 +86,9 @@ TEST(ReadColour, WhatIsWrongIsSaid) {
 // Motion JPEG keeps colours to a few levels.
 TEST(ReadColour, OfAVideoInAnyOrder) {
   const fs::path file = testing::FreshFolder() / "film.avi";
-  cv::VideoWriter writer(file.string(), cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10,
-                         {64, 48});
-  ASSERT_TRUE(writer.isOpened());
-  for (int i = 0; i < 6; ++i) writer.write(Colourful(i));
-  writer.release();
+  std::vector<cv::Mat> images;
+  for (int i = 0; i < 6; ++i) images.push_back(Colourful(i));
+  ASSERT_TRUE(testing::WriteMotionJpeg(file, images));
   const auto dataset = OpenDataset(file, ColourOptions());
   for (const int i : {4, 1, 5, 0}) {
     const ColourImage read = dataset->ReadColour(static_cast<std::size_t>(i));

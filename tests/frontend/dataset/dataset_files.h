@@ -1,12 +1,19 @@
 // Small data sets on disk for tests of the readers.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 #include <string>
+#include <vector>
 
-#include "tutti/core/error.h"
+#include "frontend/dataset/image_file.h"
+#include "frontend/dataset/rectified_rig.h"
+#include "tests/support/error_of.h"
+#include "tests/support/test_data.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti::testing {
@@ -56,24 +63,32 @@ inline void MakeKitti(const std::filesystem::path& folder, int n, bool stereo,
   WriteText(folder / "calib.txt", kCalibration);
 }
 
-inline PinholeCamera SmallCamera() {
-  PinholeCamera camera;
-  camera.width = 64;
-  camera.height = 48;
-  camera.fx = camera.fy = 60;
-  camera.cx = 32;
-  camera.cy = 24;
-  return camera;
+inline PinholeCamera SmallCamera() { return Pinhole(60, 60, 32, 24, {64, 48}); }
+
+/// The message of the InputError that opening throws; "no error" if it throws none.
+inline std::string OpenError(const std::filesystem::path& folder, const DatasetOptions& options) {
+  return ErrorOf([&] { OpenDataset(folder, options); });
 }
 
-/// The message of the InputError that opening throws; empty if it throws none.
-inline std::string OpenError(const std::filesystem::path& folder, const DatasetOptions& options) {
-  try {
-    OpenDataset(folder, options);
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return {};
+/// Frame i, which must be there.
+inline InputFrame FrameOf(const Dataset& data, std::size_t i) {
+  const ReadResult read = data.Read(i);
+  EXPECT_TRUE(read.frame) << read.error;
+  return read.frame.value_or(InputFrame());
+}
+
+/// Greatest difference of two images' pixels.
+inline double Difference(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
+}
+
+/// Motion JPEG (.avi), which loses a little. False if this OpenCV can't.
+inline bool WriteMotionJpeg(const std::filesystem::path& file, const std::vector<cv::Mat>& images,
+                            double rate_hz = 25) {
+  cv::VideoWriter writer(file.string(), cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'),
+                         rate_hz, images.front().size());
+  for (const cv::Mat& image : images) writer.write(ToColour(image));
+  return writer.isOpened();
 }
 
 inline DatasetOptions With(Sensor sensor, bool camera = false) {

@@ -2,8 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <opencv2/videoio.hpp>
-
 #include "tests/frontend/dataset/dataset_files.h"
 #include "tests/support/test_data.h"
 
@@ -11,12 +9,9 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FreshFolder;
+using testing::FrameOf, testing::FreshFolder, testing::OpenError, testing::Picture, testing::With,
+    testing::WriteImage;
 using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::Picture;
-using testing::With;
-using testing::WriteImage;
 
 bool Never() { return false; }
 
@@ -84,10 +79,9 @@ TEST(FollowedFolder, DepthThatIsListedLaterIsWaitedForUnlessANewerFrameHasIt) {
   asked = 0;
   EXPECT_TRUE(dataset->WaitFor(2, [&] { return ++asked > 100; }));
   EXPECT_EQ(asked, 0);
-  const ReadResult alone = dataset->Read(2);
-  ASSERT_TRUE(alone.frame.has_value()) << alone.error;
-  EXPECT_EQ(alone.frame->index, 2);
-  EXPECT_TRUE(alone.frame->depth_m.empty());
+  const InputFrame alone = FrameOf(*dataset, 2);
+  EXPECT_EQ(alone.index, 2);
+  EXPECT_TRUE(alone.depth_m.empty());
 }
 
 TEST(FollowedFolder, EndsWithoutNewImagesAndWhenAskedTo) {
@@ -118,12 +112,9 @@ class Camera : public ::testing::Test {
  protected:
   void SetUp() override {
     file_ = FreshFolder() / "camera.avi";
-    cv::VideoWriter writer(file_.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
-    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
-    for (int i = 0; i < 5; ++i) {
-      cv::Mat image(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20));
-      writer.write(image);
-    }
+    std::vector<cv::Mat> images;
+    for (int i = 0; i < 5; ++i) images.emplace_back(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20));
+    if (!testing::WriteMotionJpeg(file_, images)) GTEST_SKIP() << "this OpenCV can't write a video";
   }
   fs::path file_;
 };
@@ -133,11 +124,10 @@ TEST_F(Camera, FramesComeOnceAndInOrder) {
   EXPECT_EQ(dataset->FrameSupply(), Supply::kOnce);
   for (std::size_t i = 0; i < 5; ++i) {
     ASSERT_TRUE(dataset->WaitFor(i, Never));
-    const ReadResult read = dataset->Read(i);
-    ASSERT_TRUE(read.frame.has_value()) << read.error;
-    EXPECT_EQ(read.frame->index, static_cast<std::int64_t>(i));
-    EXPECT_NEAR(read.frame->stamp_s, static_cast<double>(i) / 25, 1e-9);
-    EXPECT_NEAR(cv::mean(read.frame->image)[0], 40.0 * static_cast<double>(i) + 20, 4);
+    const InputFrame read = FrameOf(*dataset, i);
+    EXPECT_EQ(read.index, static_cast<std::int64_t>(i));
+    EXPECT_NEAR(read.stamp_s, static_cast<double>(i) / 25, 1e-9);
+    EXPECT_NEAR(cv::mean(read.image)[0], 40.0 * static_cast<double>(i) + 20, 4);
   }
   EXPECT_FALSE(dataset->WaitFor(5, Never));
   EXPECT_THAT(dataset->Read(0).error, HasSubstr("come once"));

@@ -13,11 +13,8 @@
 
 namespace tutti {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::With;
+using ::testing::AllOf, ::testing::HasSubstr;
+using testing::FrameOf, testing::OpenError, testing::With;
 
 // Sends so many pictures as network cameras do (motion JPEG) to everyone who asks, and then hangs up.
 class NetworkCamera {
@@ -78,11 +75,10 @@ TEST(Stream, GivesItsFramesOnceInOrderUntilItEnds) {
   std::size_t frames = 0;
   double before = 0;
   for (; dataset->WaitFor(frames, [] { return false; }); ++frames) {
-    const ReadResult read = dataset->Read(frames);
-    ASSERT_TRUE(read.frame) << read.error;
-    EXPECT_EQ(read.frame->image.size(), cv::Size(64, 48));
-    EXPECT_GT(read.frame->stamp_s, before);
-    before = read.frame->stamp_s;
+    const InputFrame read = FrameOf(*dataset, frames);
+    EXPECT_EQ(read.image.size(), cv::Size(64, 48));
+    EXPECT_GT(read.stamp_s, before);
+    before = read.stamp_s;
   }
   EXPECT_GE(frames, std::size_t{kFrames - 2});  // FFmpeg may keep the last for itself
   EXPECT_LE(frames, std::size_t{kFrames});

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 #include <thread>
 
 #include "gmock/gmock.h"
@@ -13,15 +12,9 @@
 
 namespace tutti {
 namespace {
-
+using testing::Difference, testing::FrameOf, testing::FreshFolder, testing::MakeKitti, testing::OpenError,
+    testing::Picture, testing::With, testing::WriteImage, testing::WriteText;
 using ::testing::HasSubstr;
-using tutti::testing::FreshFolder;
-using tutti::testing::MakeKitti;
-using tutti::testing::OpenError;
-using tutti::testing::Picture;
-using tutti::testing::With;
-using tutti::testing::WriteImage;
-using tutti::testing::WriteText;
 
 TEST(DatasetTest, KittiStereoHasCalibrationBaselineStampsAndPoses) {
   const auto folder = FreshFolder();
@@ -33,10 +26,9 @@ TEST(DatasetTest, KittiStereoHasCalibrationBaselineStampsAndPoses) {
   EXPECT_DOUBLE_EQ(data->Rig().baseline_m, 0.5);
   EXPECT_NEAR(data->Rig().rate_hz, 10, 1e-9);
   EXPECT_DOUBLE_EQ(data->Stamp(3), 0.3);
-  const ReadResult frame = data->Read(2);
-  ASSERT_TRUE(frame.frame) << frame.error;
-  EXPECT_EQ(cv::norm(frame.frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(frame.frame->right, Picture(64, 48, 102), cv::NORM_INF), 0);
+  const InputFrame frame = FrameOf(*data, 2);
+  EXPECT_EQ(Difference(frame.image, Picture(64, 48, 2)), 0);
+  EXPECT_EQ(Difference(frame.right, Picture(64, 48, 102)), 0);
   ASSERT_TRUE(data->GroundTruthFile());
   const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
   ASSERT_EQ(truth.size(), 4U);
@@ -78,7 +70,7 @@ TEST(DatasetTest, ANumberIsThePlaceAmongTheImagesWhateverTheirNamesAndRefusedLin
   ASSERT_EQ(listed->Size(), 2U);
   EXPECT_EQ(listed->Number(0), 1);
   EXPECT_EQ(listed->Read(0).frame->index, 1);
-  EXPECT_EQ(cv::norm(listed->Read(0).frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
+  EXPECT_EQ(Difference(listed->Read(0).frame->image, Picture(64, 48, 2)), 0);
 }
 
 TEST(DatasetTest, StartEndAndStrideChooseFramesThatKeepTheirNumbers) {
@@ -92,12 +84,11 @@ TEST(DatasetTest, StartEndAndStrideChooseFramesThatKeepTheirNumbers) {
   ASSERT_EQ(data->Size(), 3U);  // 1, 4, 7
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t number = 1 + 3 * static_cast<std::int64_t>(i);
-    const ReadResult read = data->Read(i);
-    ASSERT_TRUE(read.frame) << read.error;
-    EXPECT_EQ(read.frame->index, number);
+    const InputFrame read = FrameOf(*data, i);
+    EXPECT_EQ(read.index, number);
     EXPECT_EQ(data->Number(i), number);
     EXPECT_DOUBLE_EQ(data->Stamp(i), 0.1 * static_cast<double>(number));
-    EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, static_cast<int>(number)), cv::NORM_INF), 0);
+    EXPECT_EQ(Difference(read.image, Picture(64, 48, static_cast<int>(number))), 0);
     EXPECT_EQ(FindStamp(*data, data->Stamp(i)), i);
   }
   EXPECT_FALSE(FindStamp(*data, 0.2));
@@ -146,13 +137,31 @@ TEST(DatasetTest, ColourBecomesGreyAndSixteenBitIsScaled) {
   WriteImage(folder / "1.png", colour);
   const auto data = OpenDataset(folder, With(Sensor::kMono));
   EXPECT_EQ(data->Read(0).frame->image.type(), CV_8UC1);
-  EXPECT_LE(cv::norm(data->Read(0).frame->image, Picture(64, 48, 0), cv::NORM_INF), 1);
+  EXPECT_LE(Difference(data->Read(0).frame->image, Picture(64, 48, 0)), 1);
 
   const auto deep_folder = folder / "deep";
   WriteImage(deep_folder / "1.png", Picture(64, 48, 0, CV_16UC1));  // 12 bit
   const auto deep = OpenDataset(deep_folder, With(Sensor::kMono));
-  EXPECT_LE(cv::norm(deep->Read(0).frame->image, Picture(64, 48, 0), cv::NORM_INF), 1);
+  EXPECT_LE(Difference(deep->Read(0).frame->image, Picture(64, 48, 0)), 1);
   EXPECT_THAT(deep->Warnings(), ::testing::Contains(HasSubstr("12-bit")));
+}
+
+TEST(DatasetTest, SixteenBitImagesOfANarrowRangeAreStretched) {
+  const auto folder = FreshFolder();
+  for (int i = 0; i < 5; ++i) {  // a thermal camera: 7000 to 7255 of 16384
+    cv::Mat image;
+    Picture(64, 48, i).convertTo(image, CV_16U, 1, 7000);
+    WriteImage(folder / (std::to_string(i) + ".png"), image);
+  }
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  double low = 0, high = 0;
+  cv::minMaxLoc(data->Read(4).frame->image, &low, &high);
+  EXPECT_GT(high - low, 100);  // 4 without
+  EXPECT_THAT(data->Warnings(), ::testing::Contains(HasSubstr("narrow range")));
+  // One scale for all: equal temperatures stay equal.
+  WriteImage(folder / "5.png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(7128)));
+  const auto again = OpenDataset(folder, With(Sensor::kMono));
+  EXPECT_NEAR(again->Read(5).frame->image.at<unsigned char>(0, 0), 128, 4);
 }
 
 TEST(DatasetTest, TumAssociatesEachDepthImageOnceByTime) {
@@ -185,7 +194,7 @@ TEST(DatasetTest, TumAssociatesEachDepthImageOnceByTime) {
     EXPECT_TRUE(read.frame->depth_m.empty());
     EXPECT_TRUE(read.depth_error.empty()) << read.depth_error;
     EXPECT_EQ(read.frame->index, static_cast<std::int64_t>(i));
-    EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, static_cast<int>(i)), cv::NORM_INF), 0);
+    EXPECT_EQ(Difference(read.frame->image, Picture(64, 48, static_cast<int>(i))), 0);
   }
   options.max_depth_m = 1.5;
   EXPECT_FLOAT_EQ(OpenDataset(folder, options)->Read(1).frame->depth_m.at<float>(5, 5), 0.0F);
@@ -208,7 +217,7 @@ TEST(DatasetTest, IclNuimHasDepthFirstFrameNumbersForStampsAndMirroredTruth) {
   options.camera->fy = -60;  // as published
   const auto data = OpenDataset(folder, options);
   EXPECT_NEAR(data->Stamp(1), 2.0 / 30, 1e-9);
-  EXPECT_EQ(cv::norm(data->Read(1).frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
+  EXPECT_EQ(Difference(data->Read(1).frame->image, Picture(64, 48, 2)), 0);
   EXPECT_GT(data->Rig().camera.fy, 0);
   const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
   EXPECT_NEAR(truth[1].stamp_s, data->Stamp(1), 1e-9);
@@ -223,7 +232,7 @@ TEST(DatasetTest, FolderOfImagesComesInNaturalOrderWithoutStrayPictures) {
   WriteImage(folder / "ground_truth.bmp", Picture(12, 12, 0));
   const auto data = OpenDataset(folder, With(Sensor::kMono));
   ASSERT_EQ(data->Size(), 12U);
-  EXPECT_EQ(cv::norm(data->Read(9).frame->image, Picture(64, 48, 10), cv::NORM_INF), 0);
+  EXPECT_EQ(Difference(data->Read(9).frame->image, Picture(64, 48, 10)), 0);
   EXPECT_FALSE(data->Rig().calibrated);
   EXPECT_TRUE(OpenDataset(folder, With(Sensor::kMono, true))->Rig().calibrated);
 }
@@ -314,18 +323,15 @@ TEST(DatasetTest, KittiTimesMayBeInNanosecondsAndPosesNumbered) {
 
 TEST(DatasetTest, VideoGivesTheSameFramesInAnyOrder) {
   const auto file = FreshFolder() / "clip.avi";
-  {
-    cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
-    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
-    for (int i = 0; i < 20; ++i) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(10 * i)));
-  }
+  std::vector<cv::Mat> images;
+  for (int i = 0; i < 20; ++i) images.emplace_back(48, 64, CV_8UC3, cv::Scalar::all(10 * i));
+  if (!testing::WriteMotionJpeg(file, images)) GTEST_SKIP() << "this OpenCV can't write a video";
   const auto data = OpenDataset(file, With(Sensor::kMono));
   ASSERT_EQ(data->Size(), 20U);
   EXPECT_NEAR(data->Stamp(5), 0.2, 1e-9);
   for (const std::size_t i : {0U, 7U, 3U, 19U, 1U}) {
-    const ReadResult frame = data->Read(i);
-    ASSERT_TRUE(frame.frame) << frame.error;
-    EXPECT_NEAR(frame.frame->image.at<unsigned char>(20, 20), 10.0 * static_cast<double>(i), 3);
+    const InputFrame frame = FrameOf(*data, i);
+    EXPECT_NEAR(frame.image.at<unsigned char>(20, 20), 10.0 * static_cast<double>(i), 3);
   }
 }
 
@@ -367,10 +373,9 @@ TEST(DatasetTest, RealRedkitchen) {
   options.camera->height = 480;
   const auto data = OpenDataset(path, options);
   EXPECT_EQ(data->Size(), 500U);
-  const ReadResult frame = data->Read(100);
-  ASSERT_TRUE(frame.frame) << frame.error;
+  const InputFrame frame = FrameOf(*data, 100);
   double most = 0;
-  cv::minMaxLoc(frame.frame->depth_m, nullptr, &most);
+  cv::minMaxLoc(frame.depth_m, nullptr, &most);
   EXPECT_GT(most, 1);
   EXPECT_LT(most, 14);
 }
@@ -386,13 +391,12 @@ TEST(DatasetTest, RealEurocPairsAreRectified) {
   const auto data = OpenDataset(path, With(Sensor::kStereo));
   ASSERT_EQ(data->Size(), 95U);
   EXPECT_NEAR(data->Rig().baseline_m, 0.11, 0.001);
-  const ReadResult read = data->Read(50);
-  ASSERT_TRUE(read.frame) << read.error;
+  const InputFrame read = FrameOf(*data, 50);
   const auto orb = cv::ORB::create(1500);
   std::vector<cv::KeyPoint> left, right;
   cv::Mat left_descriptors, right_descriptors;
-  orb->detectAndCompute(read.frame->image, cv::noArray(), left, left_descriptors);
-  orb->detectAndCompute(read.frame->right, cv::noArray(), right, right_descriptors);
+  orb->detectAndCompute(read.image, cv::noArray(), left, left_descriptors);
+  orb->detectAndCompute(read.right, cv::noArray(), right, right_descriptors);
   std::vector<cv::DMatch> matches;
   cv::BFMatcher(cv::NORM_HAMMING, true).match(left_descriptors, right_descriptors, matches);
   std::vector<double> rows;

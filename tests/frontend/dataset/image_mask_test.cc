@@ -4,8 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <opencv2/videoio.hpp>
-
 #include "frontend/features/rectifier.h"
 #include "tests/frontend/dataset/dataset_files.h"
 #include "tests/support/error_of.h"
@@ -15,13 +13,9 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using testing::FreshFolder;
-using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::Picture;
-using testing::With;
-using testing::WriteImage;
+using ::testing::AllOf, ::testing::HasSubstr;
+using testing::Difference, testing::FreshFolder, testing::OpenError, testing::Picture, testing::With,
+    testing::WriteImage;
 
 // The lower 10 of 48 rows are not used.
 cv::Mat LowerRows(cv::Size size = {64, 48}) {
@@ -46,8 +40,7 @@ TEST(ImageMask, OfAllImagesComesWithEachFrame) {
   const fs::path folder = ThreeImages(), mask = folder.parent_path() / "mask.png";
   WriteImage(mask, LowerRows());
   const auto dataset = OpenDataset(folder, Masked(mask));
-  for (std::size_t i = 0; i < 3; ++i)
-    EXPECT_EQ(cv::norm(dataset->Read(i).frame->mask, LowerRows(), cv::NORM_L1), 0);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(Difference(dataset->Read(i).frame->mask, LowerRows()), 0);
   EXPECT_TRUE(dataset->Warnings().empty());
   EXPECT_TRUE(OpenDataset(folder, With(Sensor::kMono, true))->Read(0).frame->mask.empty());
 }
@@ -57,7 +50,7 @@ TEST(ImageMask, OfEachImageHasItsNameAndThoseWithoutAreCounted) {
   WriteImage(masks / "view1.bmp", LowerRows());
   const auto dataset = OpenDataset(folder, Masked(masks));
   EXPECT_TRUE(dataset->Read(0).frame->mask.empty());
-  EXPECT_EQ(cv::norm(dataset->Read(1).frame->mask, LowerRows(), cv::NORM_L1), 0);
+  EXPECT_EQ(Difference(dataset->Read(1).frame->mask, LowerRows()), 0);
   ASSERT_EQ(dataset->Warnings().size(), 1u);
   EXPECT_THAT(dataset->Warnings()[0], HasSubstr("2 of 3 images have no mask"));
 }
@@ -69,23 +62,20 @@ TEST(ImageMask, IsRectifiedWithTheImage) {
   options.camera->distortion = Distortion::kRadTan;
   options.camera->coefficients = {-0.3, 0.1, 0, 0, 0};
   const Rectifier rectifier(*options.camera);
-  EXPECT_EQ(cv::norm(OpenDataset(folder, options)->Read(0).frame->mask,
-                     rectifier.Apply(LowerRows(), Sampling::kNearest), cv::NORM_L1),
+  EXPECT_EQ(Difference(OpenDataset(folder, options)->Read(0).frame->mask,
+                       rectifier.Apply(LowerRows(), Sampling::kNearest)),
             0);
 }
 
 TEST(ImageMask, OfAVideoIsOneForAllFrames) {
   const fs::path folder = FreshFolder(), file = folder / "video.avi";
-  {
-    cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
-    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
-    for (int i = 0; i < 3; ++i) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(40 * i + 20)));
-  }
+  const std::vector<cv::Mat> images(3, cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(40)));
+  if (!testing::WriteMotionJpeg(file, images)) GTEST_SKIP() << "this OpenCV can't write a video";
   WriteImage(folder / "mask.png", LowerRows());
   for (const std::string& name : {file.string(), "camera:" + file.string()}) {
     const auto dataset = OpenDataset(name, Masked(folder / "mask.png"));
     ASSERT_TRUE(dataset->WaitFor(0, [] { return false; }));
-    EXPECT_EQ(cv::norm(dataset->Read(0).frame->mask, LowerRows(), cv::NORM_L1), 0) << name;
+    EXPECT_EQ(Difference(dataset->Read(0).frame->mask, LowerRows()), 0) << name;
   }
   WriteImage(folder / "masks" / "0.png", LowerRows());
   EXPECT_THAT(OpenError(file, Masked(folder / "masks")),

@@ -9,11 +9,8 @@
 
 namespace tutti {
 namespace {
-
-using ::testing::AllOf;
-using testing::ErrorOf;
-using ::testing::HasSubstr;
-using testing::With;
+using ::testing::AllOf, ::testing::HasSubstr;
+using testing::ErrorOf, testing::With;
 
 const cv::Size kSize(64, 48);
 
@@ -104,12 +101,9 @@ TEST(RightCamera, ThatCantBeUsedIsRefusedByItsKey) {
               HasSubstr("camera.right: the principal point"));
   EXPECT_THAT(problem([](DatasetOptions& o) { o.T_right_left = {}; }), HasSubstr("T_right_left is missing"));
   EXPECT_THAT(problem([](DatasetOptions& o) { o.right.reset(); }), HasSubstr("needs the right camera's fx"));
-  EXPECT_THAT(problem([](DatasetOptions& o) { o.T_right_left[0] = 2; }),
-              HasSubstr("is not a rigid transform"));
-  EXPECT_THAT(problem([](DatasetOptions& o) { o.T_right_left[0] = -1; }),
-              HasSubstr("is not a rigid transform"));
-  EXPECT_THAT(problem([](DatasetOptions& o) { o.T_right_left[15] = 0; }),
-              HasSubstr("is not a rigid transform"));
+  for (const auto& [place, value] : {std::pair(0, 2.0), {0, -1.0}, {15, 0.0}})
+    EXPECT_THAT(problem([&](DatasetOptions& o) { o.T_right_left[static_cast<std::size_t>(place)] = value; }),
+                HasSubstr("is not a rigid transform"));
   EXPECT_THAT(problem([](DatasetOptions& o) { o.T_right_left[3] = std::nan(""); }),
               HasSubstr("T_right_left"));
 }

@@ -1,5 +1,5 @@
 // Bags as librosbag wrote them (bags/, by rosbag 1.15 of Debian 12), and damaged ones.
-#include "frontend/dataset/ros_bag.h"
+#include "frontend/dataset/bag.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,10 +15,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::BagPacking;
-using testing::BagWriter;
-using testing::ErrorOf;
-using testing::FreshFile;
+using testing::BagPacking, testing::BagWriter, testing::ErrorOf, testing::FreshFile;
 using ::testing::HasSubstr;
 
 std::string Message(int i) { return std::string(12, '\0') + "message " + std::to_string(i); }
@@ -40,20 +37,19 @@ std::vector<std::string> All(const Bag& bag) {
 class EveryPacking : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryPacking, OfLibrosbagIsRead) {
-  const auto opened = Bag::Open(testing::SourceDir() / "tests/frontend/dataset/bags" / (GetParam() + ".bag"));
-  const Bag& bag = *opened;
-  EXPECT_EQ(bag.damage(), "");
-  ASSERT_EQ(bag.topics().size(), 3u);
-  EXPECT_EQ(bag.topics()[0].name, "/left/camera_info");
-  EXPECT_EQ(bag.topics()[1].type, "sensor_msgs/Image");
-  EXPECT_EQ(bag.topics()[2].type, "sensor_msgs/CompressedImage");
-  const std::vector<BagMessage> images = bag.Messages("/left/image");
+  const auto bag = Bag::Open(testing::SourceDir() / "tests/frontend/dataset/bags" / (GetParam() + ".bag"));
+  EXPECT_EQ(bag->damage(), "");
+  ASSERT_EQ(bag->topics().size(), 3u);
+  EXPECT_EQ(bag->topics()[0].name, "/left/camera_info");
+  EXPECT_EQ(bag->topics()[1].type, "sensor_msgs/Image");
+  EXPECT_EQ(bag->topics()[2].type, "sensor_msgs/CompressedImage");
+  const std::vector<BagMessage> images = bag->Messages("/left/image");
   ASSERT_EQ(images.size(), 3u);
   for (int i = 0; i < 3; ++i) {
     const auto k = static_cast<std::size_t>(i);
     EXPECT_DOUBLE_EQ(images[k].stamp_s, 100.5 + i);
     const cv::Mat image = testing::Picture(16, 12, i);
-    const std::string bytes = bag.Read(images[k]);
+    const std::string bytes = bag->Read(images[k]);
     EXPECT_EQ(bytes.substr(bytes.size() - image.total()), std::string(image.datastart, image.dataend));
   }
 }
@@ -62,12 +58,12 @@ INSTANTIATE_TEST_SUITE_P(RosBag, EveryPacking, ::testing::Values("plain", "bz2",
 
 TEST(RosBag, MessagesInAnyOrder) {
   for (const BagPacking packing : {BagPacking::kPlain, BagPacking::kBz2, BagPacking::kLz4}) {
-    const RosBag bag(FreshFile("x.bag", Of(packing)));
-    const std::vector<BagMessage> messages = bag.Messages("/a");
+    const auto bag = Bag::Open(FreshFile("x.bag", Of(packing)));
+    const std::vector<BagMessage> messages = bag->Messages("/a");
     ASSERT_EQ(messages.size(), 4u);
     for (const std::size_t i : {3u, 0u, 2u, 2u, 1u})
-      EXPECT_EQ(bag.Read(messages[i]), Message(static_cast<int>(i)));
-    EXPECT_TRUE(bag.Messages("/b").empty());
+      EXPECT_EQ(bag->Read(messages[i]), Message(static_cast<int>(i)));
+    EXPECT_TRUE(bag->Messages("/b").empty());
   }
 }
 
@@ -75,11 +71,11 @@ TEST(RosBag, CutOffWhileRecordingGivesWhatLiesBefore) {
   BagWriter open(BagPacking::kPlain, 1000000);
   for (int i = 0; i < 4; ++i) open.Write("/a", "any/Type", Message(i));
   const std::string bytes = open.Finish(true);
-  EXPECT_THAT(All(RosBag(FreshFile("open.bag", bytes))),
+  EXPECT_THAT(All(*Bag::Open(FreshFile("open.bag", bytes))),
               ::testing::ElementsAre(Message(0), Message(1), Message(2), Message(3)));
-  const RosBag cut(FreshFile("cut.bag", bytes.substr(0, bytes.size() - 5)));
-  EXPECT_EQ(cut.Messages("/a").size(), 3u);
-  EXPECT_THAT(cut.damage(), HasSubstr("was cut off while recording, at byte "));
+  const auto cut = Bag::Open(FreshFile("cut.bag", bytes.substr(0, bytes.size() - 5)));
+  EXPECT_EQ(cut->Messages("/a").size(), 3u);
+  EXPECT_THAT(cut->damage(), HasSubstr("was cut off while recording, at byte "));
 }
 
 TEST(RosBag, ACutAnywhereGivesTheMessagesBeforeIt) {
@@ -87,8 +83,8 @@ TEST(RosBag, ACutAnywhereGivesTheMessagesBeforeIt) {
     const std::string bytes = Of(packing);
     std::size_t before = 0;
     for (std::size_t size = 13; size < bytes.size(); size += 7) {
-      const RosBag bag(FreshFile("x.bag", bytes.substr(0, size)));
-      const std::vector<std::string> messages = All(bag);
+      const auto bag = Bag::Open(FreshFile("x.bag", bytes.substr(0, size)));
+      const std::vector<std::string> messages = All(*bag);
       EXPECT_GE(messages.size(), before);
       before = messages.size();
       for (std::size_t i = 0; i < messages.size(); ++i) EXPECT_EQ(messages[i], Message(static_cast<int>(i)));
@@ -102,19 +98,19 @@ TEST(RosBag, ADamagedChunkIsCountedByItsIndexAndTheOthersAreRead) {
   std::size_t chunk = 0;
   for (int i = 0; i < 2; ++i) chunk = bytes.find("compression=lz4", chunk + 1);
   for (std::size_t i = 50; i < 90; ++i) bytes[chunk + i] = '\xff';
-  const RosBag bag(FreshFile("x.bag", bytes));
-  EXPECT_THAT(All(bag), ::testing::ElementsAre(Message(0), Message(2), Message(3)));
-  EXPECT_EQ(bag.Lost("/a"), 1u);
-  EXPECT_THAT(bag.damage(), HasSubstr("can't be unpacked"));
+  const auto bag = Bag::Open(FreshFile("x.bag", bytes));
+  EXPECT_THAT(All(*bag), ::testing::ElementsAre(Message(0), Message(2), Message(3)));
+  EXPECT_EQ(bag->Lost("/a"), 1u);
+  EXPECT_THAT(bag->damage(), HasSubstr("can't be unpacked"));
 }
 
 // Who reads a frame says which file it is of.
 TEST(RosBag, AMessageThatIsGoneIsSaidWithoutTheFilesName) {
   const std::filesystem::path file = FreshFile("x.bag", Of(BagPacking::kLz4));
-  const RosBag bag(file);
-  const std::vector<BagMessage> messages = bag.Messages("/a");
+  const auto bag = Bag::Open(file);
+  const std::vector<BagMessage> messages = bag->Messages("/a");
   std::filesystem::resize_file(file, 20);
-  const std::string error = ErrorOf([&] { bag.Read(messages.front()); });
+  const std::string error = ErrorOf([&] { bag->Read(messages.front()); });
   EXPECT_THAT(error, HasSubstr("can't be read"));
   EXPECT_EQ(error.find("x.bag"), std::string::npos) << error;
 }
@@ -125,15 +121,15 @@ TEST(RosBag, ADamagedRecordLosesTheRestOfItsChunkAlone) {
   const std::size_t op = bytes.find("op=\x02", second);
   ASSERT_NE(op, std::string::npos);
   bytes[op - 1] = '\x7f';  // the length of the field
-  const RosBag bag(FreshFile("x.bag", bytes));
-  EXPECT_THAT(All(bag), ::testing::ElementsAre(Message(0), Message(2), Message(3)));
-  EXPECT_THAT(bag.damage(), HasSubstr("is damaged"));
+  const auto bag = Bag::Open(FreshFile("x.bag", bytes));
+  EXPECT_THAT(All(*bag), ::testing::ElementsAre(Message(0), Message(2), Message(3)));
+  EXPECT_THAT(bag->damage(), HasSubstr("is damaged"));
 }
 
 TEST(RosBag, AFileThatIsAllHolesHasNoRecord) {
   const fs::path holes = FreshFile("x.bag", "#ROSBAG V2.0\n");
   fs::resize_file(holes, std::uintmax_t{1} << 40U);
-  EXPECT_THAT(RosBag(holes).damage(), HasSubstr("at byte 13"));
+  EXPECT_THAT(Bag::Open(holes)->damage(), HasSubstr("at byte 13"));
 }
 
 }  // namespace

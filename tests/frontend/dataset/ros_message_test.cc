@@ -14,10 +14,8 @@
 
 namespace tutti {
 namespace {
-
 using ::testing::HasSubstr;
-using testing::ImageMessage;
-using testing::Picture;
+using testing::ImageMessage, testing::Picture;
 
 const char* const kImage = "sensor_msgs/Image";
 

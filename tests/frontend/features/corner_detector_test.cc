@@ -1,4 +1,4 @@
-#include "frontend/features/corner_detector.h"
+#include "frontend/features/features.h"
 #include "tests/support/rendered_world.h"
 
 #include <gtest/gtest.h>

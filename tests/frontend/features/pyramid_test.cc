@@ -1,4 +1,4 @@
-#include "frontend/features/pyramid.h"
+#include "frontend/features/features.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/state_archive.h"
-#include "frontend/features/features.h"
 #include "frontend/store/features_state.h"
 
 namespace tutti {

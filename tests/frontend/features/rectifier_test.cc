@@ -2,18 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include "frontend/dataset/rectified_rig.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
 PinholeCamera Euroc(double fx, double cx, Distortion distortion) {
-  PinholeCamera c;
-  c.width = 752;
-  c.height = 480;
-  c.fx = c.fy = fx;
-  c.cx = cx;
-  c.cy = 248.4;
+  PinholeCamera c = Pinhole(fx, fx, cx, 248.4, {752, 480});
   c.distortion = distortion;
   if (distortion == Distortion::kRadTan) c.coefficients = {-0.2834, 0.0740, 0.00019, 0.00002, 0};
   if (distortion == Distortion::kEquidistant) c.coefficients = {0.01, -0.005, 0.002, 0, 0};
@@ -55,13 +51,7 @@ TEST(RectifierTest, RemovesDistortionWithoutBlackBorders) {
 }
 
 TEST(RectifierTest, PublicTumCalibrationsWork) {
-  PinholeCamera c;
-  c.width = 640;
-  c.height = 480;
-  c.fx = 517.306408;
-  c.fy = 516.469215;
-  c.cx = 318.643040;
-  c.cy = 255.313989;
+  PinholeCamera c = Pinhole(517.306408, 516.469215, 318.643040, 255.313989, {640, 480});
   c.distortion = Distortion::kRadTan;
   c.coefficients = {0.262383, -0.953104, -0.005358, 0.002628, 1.163314};
   const Rectifier rectifier(c);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "data/synthetic/synthetic_world.h"
+#include "frontend/dataset/rectified_rig.h"
 #include "frontend/features/features.h"
 
 namespace tutti {
@@ -14,11 +15,7 @@ namespace {
 CameraRig StereoRig(int width, int height) {
   CameraRig rig;
   rig.sensor = Sensor::kStereo;
-  rig.camera.width = width;
-  rig.camera.height = height;
-  rig.camera.fx = rig.camera.fy = 0.6 * width;
-  rig.camera.cx = 0.5 * (width - 1);
-  rig.camera.cy = 0.5 * (height - 1);
+  rig.camera = Pinhole(0.6 * width, 0.6 * width, 0.5 * (width - 1), 0.5 * (height - 1), {width, height});
   rig.baseline_m = 0.5;
   return rig;
 }

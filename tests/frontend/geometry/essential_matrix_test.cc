@@ -1,4 +1,4 @@
-#include "frontend/geometry/essential_matrix.h"
+#include "frontend/geometry/two_view.h"
 
 #include <gtest/gtest.h>
 

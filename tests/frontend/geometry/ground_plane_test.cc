@@ -45,8 +45,8 @@ TEST_F(GroundPlaneTest, IsFoundWhereTheHeightIsNotKnown) {
   EXPECT_NEAR(found->Height(), kHeight, 0.05 * kHeight);
 }
 
-// As on a robot whose camera looks at the floor before it, or a dash camera that looks up. Not every pair of
-// images tells it: of these some must.
+// A robot's camera may look at the floor before it, or a dash camera up. Not every pair of images tells the
+// ground; some of these must.
 TEST_F(GroundPlaneTest, IsFoundByACameraThatLooksDownOrUp) {
   for (const double degrees : {25.0, 15.0, -8.0}) {
     const Pose T_level_pitched(

@@ -5,19 +5,12 @@
 #include <limits>
 #include <random>
 
+#include "frontend/dataset/rectified_rig.h"
+
 namespace tutti {
 namespace {
 
-PinholeCamera SolverCamera() {
-  PinholeCamera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = 500;
-  camera.fy = 510;
-  camera.cx = 322;
-  camera.cy = 238;
-  return camera;
-}
+PinholeCamera SolverCamera() { return Pinhole(500, 510, 322, 238, {640, 480}); }
 
 double Uniform(std::mt19937& generator, double low, double high) {
   return low + (high - low) * static_cast<double>(generator() % 100000) / 1e5;

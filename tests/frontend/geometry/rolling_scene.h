@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "frontend/dataset/rectified_rig.h"
 #include "frontend/geometry/rolling_shutter.h"
 
 namespace tutti::testing {
@@ -11,11 +12,7 @@ namespace tutti::testing {
 inline CameraRig RollingRig() {
   CameraRig rig;
   rig.sensor = Sensor::kRgbd;
-  rig.camera.width = 400;
-  rig.camera.height = 301;
-  rig.camera.fx = rig.camera.fy = 330;
-  rig.camera.cx = 199.5;
-  rig.camera.cy = 150;
+  rig.camera = Pinhole(330, 330, 199.5, 150, {400, 301});
   rig.readout_s = 0.03;
   return rig;
 }
@@ -45,7 +42,7 @@ struct RollingScene {
     }
   }
 
-  /// The same as features, with their depths.
+  /// What is seen as features, with their depths.
   FrameFeatures Features() const {
     FrameFeatures features;
     for (const PointObservation& o : seen) {

@@ -9,9 +9,7 @@
 
 namespace tutti {
 namespace {
-
-using testing::RollingRig;
-using testing::RollingScene;
+using testing::RollingRig, testing::RollingScene;
 
 TEST(RollingShutterTest, StraightenedFeaturesAreWhereTheMiddleRowsTimeSawThem) {
   const RollingScene scene(0.01);

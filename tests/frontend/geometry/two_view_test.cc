@@ -43,6 +43,10 @@ Matches MatchedScene(const Pose& T_second_first, bool planar, int count, double 
   return matches;
 }
 
+TwoViewResult Estimate(const Matches& m) {
+  return EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
+}
+
 void ExpectMotion(const TwoViewResult& result, double tolerance) {
   ASSERT_TRUE(result.success) << result.reason;
   EXPECT_NEAR(result.T_second_first.translation.norm(), 1, 1e-9);
@@ -58,7 +62,7 @@ TEST(Triangulate, MeetsThePointOfTwoRays) {
 
 TEST(EstimateTwoView, BoxOfPointsGivesMotionAndPoints) {
   const Matches m = MatchedScene(kMotion, false, 200, 0);
-  const TwoViewResult result = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
+  const TwoViewResult result = Estimate(m);
   ExpectMotion(result, 2e-3);
   EXPECT_FALSE(result.homography);
   EXPECT_GT(result.parallax_deg, 3);
@@ -73,8 +77,7 @@ TEST(EstimateTwoView, BoxOfPointsGivesMotionAndPoints) {
 }
 
 TEST(EstimateTwoView, PlaneGivesTheMotionByItsHomography) {
-  const Matches m = MatchedScene(kMotion, true, 200, 0.3);
-  const TwoViewResult result = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
+  const TwoViewResult result = Estimate(MatchedScene(kMotion, true, 200, 0.3));
   // A plane may leave two motions that explain it equally well: then it must refuse, not guess.
   if (!result.success) {
     EXPECT_FALSE(result.reason.empty());
@@ -86,28 +89,25 @@ TEST(EstimateTwoView, PlaneGivesTheMotionByItsHomography) {
 TEST(EstimateTwoView, WrongMatchesDoNotDisturb) {
   Matches m = MatchedScene(kMotion, false, 240, 0.3);
   for (std::size_t i = 0; i < m.second.size(); i += 4) m.second[i] = m.first[(i + 77) % m.first.size()];
-  ExpectMotion(EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions()), 0.05);
+  ExpectMotion(Estimate(m), 0.05);
 }
 
 TEST(EstimateTwoView, RotationAloneHasNoParallaxAndSaysSo) {
-  const Matches m = MatchedScene(Pose(ExpSO3({0, 0.1, 0}), Eigen::Vector3d::Zero()), false, 200, 0.3);
-  const TwoViewResult result = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
+  const Pose turn(ExpSO3({0, 0.1, 0}), Eigen::Vector3d::Zero());
+  const TwoViewResult result = Estimate(MatchedScene(turn, false, 200, 0.3));
   EXPECT_FALSE(result.success);
   EXPECT_FALSE(result.reason.empty());
 }
 
 TEST(EstimateTwoView, FewOrIdenticalOrUnequalMatchesAreRefused) {
-  const Matches few = MatchedScene(kMotion, false, 5, 0);
-  EXPECT_FALSE(EstimateTwoView(TwoViewCamera(), few.first, few.second, TwoViewOptions()).success);
-  EXPECT_FALSE(EstimateTwoView(TwoViewCamera(), {}, {}, TwoViewOptions()).success);
   const std::vector<cv::Point2f> same(100, cv::Point2f(100, 100));
-  EXPECT_FALSE(EstimateTwoView(TwoViewCamera(), same, same, TwoViewOptions()).success);
+  for (const Matches& m : {MatchedScene(kMotion, false, 5, 0), Matches(), Matches{same, same, {}}})
+    EXPECT_FALSE(Estimate(m).success) << m.first.size();
 }
 
 TEST(EstimateTwoView, SameInputGivesTheSameBits) {
   const Matches m = MatchedScene(kMotion, false, 150, 0.5);
-  const TwoViewResult a = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
-  const TwoViewResult b = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
+  const TwoViewResult a = Estimate(m), b = Estimate(m);
   ASSERT_TRUE(a.success);
   EXPECT_EQ(a.T_second_first.Matrix(), b.T_second_first.Matrix());
   EXPECT_EQ(a.valid, b.valid);
@@ -158,7 +158,7 @@ double DirectionError(const std::vector<Eigen::Vector3d>& points, double sigma_p
 TEST(DirectionSigma, IsWhatNoiseDoesToTheDirection) {
   const std::vector<Eigen::Vector3d> points = MatchedScene(kMotion, false, 100, 0).points;
   const double sigma = DirectionSigma(TwoViewCamera(), kMotion, SeenTwice(points, 0.5));
-  // Of two components the larger one is returned: the error of both is 1 to 1.41 times as much.
+  // The larger one of two components is returned: the error of both is 1 to 1.41 times as much.
   const double error = DirectionError(points, 0.5, 60);
   EXPECT_GT(error, 0.8 * sigma);
   EXPECT_LT(error, 1.6 * sigma);

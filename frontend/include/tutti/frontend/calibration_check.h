@@ -51,7 +51,7 @@ struct CalibrationReport {
 CalibrationReport CheckCalibration(const CameraRig& rig, const std::vector<InputFrame>& frames,
                                    const CalibrationCheckOptions& options = {});
 
-/// The same for a data set: reads options.frames of its first 100 frames if it is stored (mono: none). A data
+/// Checks a data set: reads options.frames of its first 100 frames if it is stored (mono: none). A data
 /// set without calibration has no findings.
 CalibrationReport CheckCalibration(const Dataset& dataset, const CalibrationCheckOptions& options = {});
 

@@ -1,15 +1,38 @@
-#include "data/synthetic/hand.h"
+#include "data/synthetic/moving_camera.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "data/synthetic/synthetic_random.h"
 
 namespace tutti::synthetic {
 namespace {
+
 const Eigen::Vector3d kLever(0.03, -0.06, 0.19);  // wrist to camera, in the camera frame: 0.2 m
 constexpr double kSlowestHz = 0.5, kFastestHz = 1.3;
 constexpr double kMeasuredFor = 60, kStep = 0.005;  // where the fastest turning is looked for [s]
+
+constexpr int kStripRows = 4;
+
+// The mean over the exposure around a time.
+Rendering Mean(const PinholeCamera& camera, const Shutter& shutter, double time_s, const View& view) {
+  const int steps = shutter.exposure_s > 0 ? shutter.samples : 1, middle = steps / 2;
+  Rendering sum;
+  for (int k = 0; k < steps; ++k) {
+    const double at = time_s + (steps == 1 ? 0.0 : shutter.exposure_s * (k - middle) / double(steps));
+    Rendering one = view(camera, at);
+    if (k == 0) {
+      sum = std::move(one);
+    } else {
+      sum.image += one.image;
+      if (k == middle) sum.depth_m = one.depth_m;
+    }
+  }
+  if (steps > 1) sum.image *= 1.0 / steps;
+  return sum;
+}
+
 }  // namespace
 
 Hand::Hand(std::uint64_t seed, double peak_deg_per_s) : peak_(peak_deg_per_s * M_PI / 180) {
@@ -48,6 +71,29 @@ Pose Hand::At(double time_s) const {
                                     Eigen::AngleAxisd(Angle(axes_[0], time_s), Eigen::Vector3d::UnitX()) *
                                     Eigen::AngleAxisd(Angle(axes_[2], time_s), Eigen::Vector3d::UnitZ());
   return Pose(turned, turned * kLever - kLever);
+}
+
+PinholeCamera RowsOf(const PinholeCamera& camera, int first, int rows) {
+  PinholeCamera part = camera;
+  part.cy = camera.cy - first;
+  part.height = rows;
+  return part;
+}
+
+Rendering Expose(const PinholeCamera& camera, const Shutter& shutter, double time_s, const View& view) {
+  if (!(shutter.readout_s > 0)) return Mean(camera, shutter, time_s, view);
+  Rendering whole;
+  whole.image.create(camera.height, camera.width, CV_32FC1);
+  whole.depth_m.create(camera.height, camera.width, CV_32FC1);
+  const double last = camera.height - 1;
+  for (int first = 0; first < camera.height; first += kStripRows) {
+    const int rows = std::min(kStripRows, camera.height - first);
+    const double late = shutter.readout_s * ((first + 0.5 * (rows - 1)) / last - 0.5);
+    const Rendering strip = Mean(RowsOf(camera, first, rows), shutter, time_s + late, view);
+    strip.image.copyTo(whole.image.rowRange(first, first + rows));
+    strip.depth_m.copyTo(whole.depth_m.rowRange(first, first + rows));
+  }
+  return whole;
 }
 
 }  // namespace tutti::synthetic

@@ -1,5 +1,5 @@
 // Cameras that were not upright.
-#include "frontend/dataset/turned_dataset.h"
+#include "frontend/dataset/wrapped_dataset.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,12 +11,8 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FreshFolder;
+using testing::FreshFolder, testing::OpenError, testing::Picture, testing::With, testing::WriteImage;
 using ::testing::HasSubstr;
-using testing::OpenError;
-using testing::Picture;
-using testing::With;
-using testing::WriteImage;
 
 DatasetOptions Turned(int degrees, Sensor sensor = Sensor::kMono) {
   DatasetOptions options = With(sensor, true);
@@ -104,7 +100,7 @@ TEST(TurnedDataset, RefusesPairsRollingShuttersAndOtherAngles) {
   DatasetOptions pairs = Turned(180, Sensor::kStereo);
   pairs.baseline_m = 0.5;
   EXPECT_THAT(OpenError(folder, pairs), HasSubstr("stereo pairs can't be turned"));
-  EXPECT_EQ(OpenError(folder, Turned(180)), "");
+  EXPECT_EQ(OpenError(folder, Turned(180)), "no error");
   DatasetOptions rolling = Turned(90);
   rolling.readout_s = 0.02;
   EXPECT_THAT(OpenError(folder, rolling), HasSubstr("rolling shutter"));

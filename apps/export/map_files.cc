@@ -1,8 +1,7 @@
-#include "apps/export/ply_file.h"
+#include "apps/export/map_files.h"
 
-#include <string>
+#include <nlohmann/json.hpp>
 
-#include "apps/export/little_endian.h"
 #include "core/median.h"
 #include "core/replaced_file.h"
 
@@ -25,11 +24,10 @@ void AppendVertex(const Eigen::Vector3d& at, const std::array<std::uint8_t, 3>& 
 // How far the base is from the apex [m].
 double FrustumDepth(const MapModel& model) {
   std::vector<double> steps;
-  for (std::size_t i = 1; i < model.keyframes.size(); ++i) {
+  for (std::size_t i = 1; i < model.keyframes.size(); ++i)
     steps.push_back(
         (model.keyframes[i].T_world_camera.translation - model.keyframes[i - 1].T_world_camera.translation)
             .norm());
-  }
   const double median = internal::Median(steps);
   return median > 0 ? 0.5 * median : 0.1;
 }
@@ -40,6 +38,16 @@ std::array<Eigen::Vector3d, kCorners> Frustum(const PinholeCamera& camera, doubl
   return {{Eigen::Vector3d::Zero(), depth * camera.Unproject({left, top}),
            depth * camera.Unproject({right, top}), depth * camera.Unproject({right, bottom}),
            depth * camera.Unproject({left, bottom})}};
+}
+
+// T_world_camera with y and z of the camera turned round: OpenCV's axes to OpenGL's.
+nlohmann::ordered_json OpenGlPose(const Pose& T_world_camera) {
+  Eigen::Matrix4d matrix = T_world_camera.Matrix();
+  matrix.col(1) *= -1;
+  matrix.col(2) *= -1;
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (int r = 0; r < 4; ++r) rows.push_back({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)});
+  return rows;
 }
 
 }  // namespace
@@ -54,10 +62,9 @@ void WritePly(const std::filesystem::path& file, const MapModel& model, PlyCamer
       std::to_string(points + kCorners * frusta) +
       "\nproperty float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uint observations\n";
-  if (frusta > 0) {
+  if (frusta > 0)
     bytes += "element face " + std::to_string(kTriangles.size() * frusta) +
              "\nproperty list uchar int vertex_indices\n";
-  }
   bytes += "end_header\n";
   for (const ModelLandmark& landmark : model.landmarks)
     AppendVertex(landmark.position, landmark.rgb, landmark.observations, &bytes);
@@ -74,6 +81,30 @@ void WritePly(const std::filesystem::path& file, const MapModel& model, PlyCamer
     }
   }
   internal::WriteFile(file, bytes);
+}
+
+std::string NerfTransforms(const MapModel& model, const std::vector<std::size_t>& chosen,
+                           const std::string& points) {
+  const PinholeCamera& camera = model.camera;
+  nlohmann::ordered_json json = {{"camera_model", "OPENCV"},
+                                 {"w", camera.width},
+                                 {"h", camera.height},
+                                 {"fl_x", camera.fx},
+                                 {"fl_y", camera.fy},
+                                 {"cx", camera.cx + 0.5},
+                                 {"cy", camera.cy + 0.5},
+                                 {"k1", 0.0},
+                                 {"k2", 0.0},
+                                 {"p1", 0.0},
+                                 {"p2", 0.0},
+                                 {"ply_file_path", points}};
+  json["frames"] = nlohmann::ordered_json::array();
+  for (const std::size_t k : chosen) {
+    const ModelKeyframe& keyframe = model.keyframes[k];
+    json["frames"].push_back({{"file_path", "images/" + ImageName(keyframe.frame_index)},
+                              {"transform_matrix", OpenGlPose(keyframe.T_world_camera)}});
+  }
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace tutti

@@ -121,8 +121,9 @@ LoopResult Row::Detect(std::int64_t image, const std::vector<Percept>& percepts,
     const auto view_of = [&](int slot) -> const View& {
       return percepts[static_cast<std::size_t>(slot)].view;
     };
-    if (result.proposed) reasoner_->Verify(percepts.back().view, combined.belief, verify, view_of, result);
-    reasoner_->VerifyAgain(verify, view_of, result);
+    const internal::HypothesisSearch search(options_, reasoner_->memory(), verify, view_of);
+    if (result.proposed) reasoner_->Verify(percepts.back().view, combined.belief, search, result);
+    reasoner_->VerifyAgain(search, result);
     cached_ms = MillisecondsSince(begin);
   }
   reasoner_->Finish(result);

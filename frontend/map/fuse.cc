@@ -27,7 +27,7 @@ void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* 
           map->landmark(present).observations.size() >= map->landmark(landmark).observations.size();
       const bool one_is_kept = (present < kept) != (landmark < kept);
       const bool keep_present = one_is_kept ? present < kept : more_views;
-      map->Merge(keep_present ? landmark : present, keep_present ? present : landmark);
+      map->ReplaceLandmark(keep_present ? landmark : present, keep_present ? present : landmark);
     }
   }
 }

@@ -173,7 +173,7 @@ int Map::PresentKeyframe(int id) const {
   return id;
 }
 
-void Map::Merge(int loser, int winner) {
+void Map::ReplaceLandmark(int loser, int winner) {
   if (loser == winner) return;
   const std::vector<Observation> seen = landmark(loser).observations;
   const int visible = landmark(loser).visible, found = landmark(loser).found;

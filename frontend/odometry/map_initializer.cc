@@ -11,6 +11,14 @@ constexpr std::size_t kMaxWaiting = 100;   // frames kept to be posed backwards
 constexpr int kFramesToRecognise = 3;      // of a session: with so many it starts a piece of its own
 }  // namespace
 
+MapInitializer::MapInitializer(const OdometryOptions& options, const CameraRig& rig, int piece)
+    : options_(options),
+      rig_(rig),
+      mono_(options, rig),
+      search_(options, rig),
+      piece_(piece),
+      hold_(piece > 0 ? kFramesToRecognise : 0) {}
+
 void MapInitializer::Reset() {
   mono_.Reset();
   waiting_.clear();
@@ -20,12 +28,6 @@ void MapInitializer::Reset() {
 void MapInitializer::NextPiece() {
   ++piece_;
   Reset();
-}
-
-void MapInitializer::BeginSession(int piece) {
-  piece_ = piece;
-  Reset();
-  hold_ = kFramesToRecognise;
 }
 
 MapInitializer::Start MapInitializer::Offer(const TrackedFrame& frame, const LastFrame& last,

@@ -15,8 +15,10 @@ namespace tutti {
 /// Starts the pieces of a map: from one frame that has depth, or from two views. Value type.
 class MapInitializer {
  public:
-  MapInitializer(const OdometryOptions& options, const CameraRig& rig)
-      : options_(options), rig_(rig), mono_(options, rig), search_(options, rig) {}
+  /// `piece`: number of the one that starts next. Where it is not the first, one of the first frames of the
+  /// recording may be recognised in the map: depth starts a piece only after a few that are not, which are
+  /// posed then, too.
+  MapInitializer(const OdometryOptions& options, const CameraRig& rig, int piece = 0);
 
   /// What became of a frame that a piece was to start with.
   struct Start {
@@ -33,9 +35,6 @@ class MapInitializer {
   void Reset();
   /// The same, and what starts next is another piece of the map.
   void NextPiece();
-  /// The same for the first frames of a recording that goes on in a map whose next piece this is. One of them
-  /// may be recognised there: depth starts a piece only after a few that are not, which are posed then, too.
-  void BeginSession(int piece);
   /// Number of the piece that starts next, or started last.
   int piece() const { return piece_; }
 

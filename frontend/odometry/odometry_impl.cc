@@ -39,7 +39,7 @@ void Odometry::Impl::GoOn(const Impl& before, Map map, std::int64_t frame_offset
   session_piece_ = map.NextPiece();
   frames_before_session_ = map.frames().size();
   *mapper_.RestoredMap() = std::move(map);
-  initializer_.BeginSession(session_piece_);
+  initializer_ = MapInitializer(options_, rig_, session_piece_);
   frame_offset_ = frame_offset;
 }
 

@@ -157,7 +157,7 @@ LoopResult LoopDetector::Detect(const cv::Mat& image, std::int64_t id) {
 
 LoopResult LoopDetector::Locate(const LoopQuery& query) const { return impl_->Locate(query); }
 
-void LoopDetector::BeginSession() { impl_->state().reasoner().BeginSession(); }
+void LoopDetector::BeginSession() { impl_->state().reasoner().Interrupt(); }
 void LoopDetector::ForgetPositions() { impl_->state().reasoner().track().Forget(); }
 
 std::vector<LoopPlace> LoopDetector::Places() const {
@@ -193,7 +193,7 @@ bool LoopDetector::Merge(std::int64_t id, std::int64_t into) {
   const int slot = state.memory().Find(id);
   if (slot < 0 || state.memory().Find(into) < 0) return false;
   if (state.memory().id(slot) != id) return true;  // rehearsal has merged it already
-  if (!state.reasoner().Merge(slot, into)) return false;
+  if (!state.reasoner().Replace(slot, into)) return false;
   state.DropView(slot);
   return true;
 }

@@ -58,8 +58,8 @@ int PlaceReasoner::Remember(std::int64_t id, const std::vector<SeenWords>& words
   return stands_for;
 }
 
-void PlaceReasoner::BeginSession() {
-  for (auto& system : systems_) system->BeginSession();
+void PlaceReasoner::Interrupt() {
+  for (auto& system : systems_) system->Interrupt();
   if (!Shared()) union_.Settle(0);
   track_.Interrupt();
   second_word_.Forget();
@@ -257,12 +257,12 @@ void PlaceReasoner::AddLink(std::int64_t a, std::int64_t b) {
   for (auto& system : systems_) system->AddLink(system->memory().Find(a), system->memory().Find(b));
 }
 
-bool PlaceReasoner::Merge(int slot, std::int64_t into) {
+bool PlaceReasoner::Replace(int slot, std::int64_t into) {
   const auto can = [&](const LocationMemory& m) { return m.CanMerge(slot, m.Find(into)); };
   const bool all = std::all_of(systems_.begin(), systems_.end(),
                                [&](const auto& system) { return can(system->memory()); });
   if (!all || (!Shared() && !can(union_))) return false;
-  for (auto& system : systems_) system->Merge(slot, system->memory().Find(into));
+  for (auto& system : systems_) system->Replace(slot, system->memory().Find(into));
   if (!Shared()) union_.Merge(slot, union_.Find(into));
   return true;
 }

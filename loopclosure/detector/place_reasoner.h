@@ -29,8 +29,8 @@ class PlaceReasoner {
   /// for the image: the newest, or an older one that it was merged into. `prior`: where it was taken.
   int Remember(std::int64_t id, const std::vector<SeenWords>& words,
                const std::optional<PosePrior>& prior = {});
-  /// Another recording begins (MemorySystem::BeginSession).
-  void BeginSession();
+  /// Another recording begins (MemorySystem::Interrupt).
+  void Interrupt();
   /// Step 5, and the times of its parts into `result`. `disturb`, if given, may change what each filter unit
   /// has counted: for tests of what a broken member does.
   CombinedBelief Step(LoopResult& result, const std::function<void(std::size_t, FilterUnit&)>& disturb = {});
@@ -57,8 +57,8 @@ class PlaceReasoner {
   /// They do not.
   void Unlink(std::int64_t a, std::int64_t b);
   void AddLink(std::int64_t a, std::int64_t b);
-  /// A location is merged into an older one, in every memory or in none: false, if one of them can't.
-  bool Merge(int slot, std::int64_t into);
+  /// A location is replaced by an older one, in every memory or in none: false, if one of them can't.
+  bool Replace(int slot, std::int64_t into);
 
   /// All locations: those of the shared memory, or what is in any member's.
   const LocationMemory& memory() const { return Shared() ? systems_.front()->memory() : union_; }

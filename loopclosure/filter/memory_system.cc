@@ -66,7 +66,7 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<SeenWords>& words)
   return slot;
 }
 
-void MemorySystem::BeginSession() {
+void MemorySystem::Interrupt() {
   transition_.Update(memory_, memory_.Settle(0));
   for (FilterUnit& unit : units_) {
     unit.filter = BayesFilter();

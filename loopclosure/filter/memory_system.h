@@ -93,7 +93,7 @@ class MemorySystem {
   int Remember(std::int64_t id, const std::vector<SeenWords>& words);
 
   /// Another recording begins: what was seen last is a candidate like all else, and the filters start afresh.
-  void BeginSession();
+  void Interrupt();
 
   /// Factors of the places for the present image (PoseTrack::Gains), empty: none.
   void SetGains(std::vector<double> gains) { gains_ = std::move(gains); }
@@ -128,8 +128,8 @@ class MemorySystem {
   void Store(int slot, LocationStore& store) const;
   /// It leaves WM.
   void Leave(int slot);
-  /// A location that is no longer needed is merged into an older one, if that can be.
-  void Merge(int slot, int into);
+  /// A location that is no longer needed is replaced by an older one, if that can be.
+  void Replace(int slot, int into);
 
   /// For a durable store: signatures of a new location; then all nodes that changed since the last time.
   void StoreSignatures(int slot, LocationStore& store) const;

@@ -126,7 +126,7 @@ void MemorySystem::Leave(int slot) {
   transition_.Update(memory_, {slot});
 }
 
-void MemorySystem::Merge(int slot, int into) {
+void MemorySystem::Replace(int slot, int into) {
   std::vector<int> changed = {slot, into};
   for (const LocationMemory::Link& link : memory_.links(slot)) changed.push_back(link.slot);
   memory_.Merge(slot, into);

@@ -8,7 +8,6 @@
 #include "core/state_archive.h"
 
 namespace tutti::internal {
-namespace {
 
 // Rows of the matrices that are of a vocabulary's kind, numbered through.
 class KnownRows {
@@ -60,8 +59,6 @@ class RowIndex {
   std::vector<std::uint8_t> row_;                       // the last that was looked at
   std::vector<std::pair<std::uint32_t, int>> numbers_;  // checksum, row
 };
-
-}  // namespace
 
 std::vector<int> WordStorage::Ranks() const {
   std::vector<int> ranks(Index(end()), -1);

@@ -107,13 +107,13 @@ TEST(Map, MergeHandsOverAllThatTheLoserSees) {
   const int a = map.AddLandmark({0, 0, 5}, 0, 1), b = map.AddLandmark({0, 0, 5.1}, 1, 2);
   map.AddObservation(b, 2, 3);
   map.AddObservation(a, 2, 4);  // both in keyframe 2: the winner's own feature stays
-  map.Merge(b, a);
+  map.ReplaceLandmark(b, a);
   EXPECT_FALSE(map.landmark(b).alive);
   ASSERT_EQ(map.landmark(a).observations.size(), 3U);
   EXPECT_EQ(map.landmark(a).observations[1].keyframe, 1);
   EXPECT_EQ(map.keyframe(2).landmarks[4], a);
   EXPECT_EQ(map.keyframe(2).landmarks[3], -1);
-  map.Merge(a, a);
+  map.ReplaceLandmark(a, a);
   EXPECT_TRUE(map.landmark(a).alive);
   ExpectConsistent(map);
 }

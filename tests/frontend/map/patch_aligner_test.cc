@@ -96,7 +96,9 @@ TEST(PatchAligner, FindsThePointOfTwoFeaturesThatLookAlike) {
 }
 
 TEST(PatchAligner, MovesTheKeypointsOfLandmarksAndTrustsThemMore) {
-  Map map(PyramidScales(OdometryOptions()), kCamera, 0.5);
+  CameraRig rig;
+  rig.camera = kCamera;
+  Map map(PyramidScales(OdometryOptions()), rig, 0.5);
   const Pose T_world_second(Eigen::Quaterniond::Identity(), {0.1, 0, 0});
   Keyframe keyframe;
   keyframe.features = std::make_shared<const FrameFeatures>(Frame(Texture(), kPoint));
@@ -126,7 +128,9 @@ TEST(PatchAligner, MovesTheKeypointsOfLandmarksAndTrustsThemMore) {
 }
 
 TEST(PatchAligner, FindsLandmarksWhereAPoseSaysThatTheyAreWhateverCornersThereAre) {
-  Map map(PyramidScales(OdometryOptions()), kCamera, 0.5);
+  CameraRig rig;
+  rig.camera = kCamera;
+  Map map(PyramidScales(OdometryOptions()), rig, 0.5);
   Keyframe keyframe;
   keyframe.features = std::make_shared<const FrameFeatures>(Frame(Texture(), kPoint));
   map.AddKeyframe(keyframe);

@@ -123,7 +123,7 @@ TEST_F(AsyncMapperTest, WhatFramesSawMeanwhileIsCountedWhenTheResultEnters) {
 TEST_F(AsyncMapperTest, ALandmarkThatWasMergedCountsForTheOneThatIsLeft) {
   AsyncMapper mapper = Make();
   Add(&mapper, 0);
-  mapper.MutableMap()->Merge(4, 3);
+  mapper.MutableMap()->ReplaceLandmark(4, 3);
   mapper.MutableMap()->RemoveLandmark(5);
   const int visible = mapper.map().landmark(3).visible;
   PoseFix fix(Frame(Pose(), 0));

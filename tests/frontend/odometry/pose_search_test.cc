@@ -204,7 +204,9 @@ class PoseSearchOfWindows : public ::testing::Test {
 };
 
 TEST_F(PoseSearchOfWindows, TheMotionTellsWhichOneItIsWhereCornersSayTheNext) {
-  Map map(PyramidScales(options_), camera_, options_.aligned_sigma);
+  CameraRig rig;
+  rig.camera = camera_;
+  Map map(PyramidScales(options_), rig, options_.aligned_sigma);
   Keyframe keyframe;
   keyframe.features = Frame(0, [](int window) { return window % 3 == 0; });
   map.AddKeyframe(keyframe);
@@ -216,8 +218,6 @@ TEST_F(PoseSearchOfWindows, TheMotionTellsWhichOneItIsWhereCornersSayTheNext) {
   last.frame = {0, 0, map.keyframe(0).features};
   last.matches = {last.frame.features.get(), map.keyframe(0).landmarks};
   last.reference = last.newest_keyframe = 0;
-  CameraRig rig;
-  rig.camera = camera_;
   for (const double shift_px : {6.0, 12.0, 30.0}) {
     // Of three corners that were seen one is not found again; those of the windows beside them all are.
     const auto frame = Frame(shift_px, [](int w) { return w % 3 == 2 || w % 9 == 0 || w % 9 == 3; });

@@ -48,9 +48,9 @@ class MapCheck : public ::testing::Test, protected testing::PointScene {
 
 TEST_F(MapCheck, AMapIsWhatItMustBeAlsoAfterMergers) {
   EXPECT_EQ(Complaint(), "no error");
-  map_.Merge(4, 3);
-  map_.Merge(3, 9);
-  map_.Merge(9, 2);
+  map_.ReplaceLandmark(4, 3);
+  map_.ReplaceLandmark(3, 9);
+  map_.ReplaceLandmark(9, 2);
   map_.RemoveLandmark(7);
   map_.RemoveObservation(8, 0);
   EXPECT_EQ(Complaint(), "no error");

@@ -128,7 +128,7 @@ TEST_F(TrackerTest, MergedLandmarksAreSeenOnceAndDeadOnesNotAtAll) {
   Track(Frame(Pose(), 0.1));
   const std::vector<int> before = tracker_.last().matches.landmarks;
   ASSERT_EQ(before[3], 3);
-  map_.Merge(4, 3);
+  map_.ReplaceLandmark(4, 3);
   map_.RemoveLandmark(7);
   tracker_.FollowLandmarks(map_);
   const std::vector<int>& after = tracker_.last().matches.landmarks;

@@ -118,7 +118,7 @@ class Map {
   /// views, or is removed if these are fewer than `least_views`.
   void RemoveKeyframe(int keyframe, int into, std::size_t least_views);
   /// Lets `winner` take over all that `loser` sees.
-  void Merge(int loser, int winner);
+  void ReplaceLandmark(int loser, int winner);
   /// Recomputes descriptor, viewing direction and distances of a landmark.
   void UpdateLandmark(int landmark);
   /// Viewing direction and distances alone, after keyframes or the landmark have moved.

@@ -6,7 +6,6 @@
 #include "apps/report/build_info.h"
 #include "apps/report/page.h"
 #include "apps/report/report_parts.h"
-#include "apps/run/frame_places.h"
 #include "apps/run/outputs.h"
 #include "apps/run/timing.h"
 #include "tutti/backend/evaluation.h"

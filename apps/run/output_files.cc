@@ -5,9 +5,6 @@
 #include <system_error>
 
 #include "apps/plot/plot.h"
-#include "apps/run/attempts.h"
-#include "apps/run/checkpoint.h"
-#include "apps/run/frame_places.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "core/replaced_file.h"
@@ -19,6 +16,13 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
+
+template <class Key>
+std::optional<Eigen::Vector3d> Find(const std::map<Key, Eigen::Vector3d>& places, Key key) {
+  const auto found = places.find(key);
+  if (found == places.end()) return std::nullopt;
+  return found->second;
+}
 
 // All that a run may leave, for RunFiles and IsResult to agree; pieces of the map have numbers.
 constexpr std::array<const char*, 12> kFiles = {"trajectory.txt",
@@ -88,16 +92,40 @@ TrajectoryPlot MakePlot(const RunResult& result) {
 
 }  // namespace
 
-std::size_t RunResult::LoopsAccepted() const {
-  std::size_t count = 0;
-  for (const LoopRecord& loop : loops) count += loop.accepted ? 1 : 0;
-  return count;
+void Attempts::Try(const std::function<void()>& step) noexcept {
+  try {
+    step();
+  } catch (...) {
+    if (first_ == nullptr) first_ = std::current_exception();
+  }
 }
 
-std::size_t RunResult::FramesRelocalized() const {
-  std::size_t count = 0;
-  for (const FoundFrame& frame : found) count += frame.by_loop ? 0 : 1;
-  return count;
+void Attempts::Rethrow() const {
+  if (first_ != nullptr) std::rethrow_exception(first_);
+}
+
+std::string Attempts::Failure() const {
+  try {
+    Rethrow();
+    return "";
+  } catch (const std::exception& thrown) {
+    return thrown.what();
+  } catch (...) {
+    return "unknown";
+  }
+}
+
+FramePlaces::FramePlaces(const RunResult& result, const Similarity& alignment) {
+  for (const StampedPose& pose : result.trajectory) own_[pose.stamp_s] = alignment * pose.pose.translation;
+  if (!result.map) return;
+  first_frame_ = result.map->sessions.back().frame_offset;
+  for (const auto& [frame, pose] : result.map->keyframes) earlier_[frame] = alignment * pose.translation;
+}
+
+std::optional<Eigen::Vector3d> FramePlaces::At(double stamp_s) const { return Find(own_, stamp_s); }
+
+std::optional<Eigen::Vector3d> FramePlaces::AtEnd(std::int64_t frame, double stamp_s) const {
+  return frame < first_frame_ ? Find(earlier_, frame) : At(stamp_s);
 }
 
 OutputLayout RunLayout() {

@@ -8,10 +8,8 @@
 
 #include "apps/run/graph_json.h"
 #include "apps/run/outputs.h"
-#include "apps/run/run_health.h"
-#include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
-#include "apps/run/timing.h"
+#include "apps/run/run_signs.h"
 #include "core/angle.h"
 #include "tutti/slam/version.h"
 

@@ -5,7 +5,6 @@
 #include <memory>
 
 #include "apps/run/calibration_file.h"
-#include "apps/run/photo_lens.h"
 #include "core/camera_text.h"
 #include "core/example_configs.h"
 #include "core/text_reader.h"

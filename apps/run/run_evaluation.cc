@@ -1,8 +1,8 @@
-#include "apps/run/run_evaluation.h"
-
+// A run against its ground truth.
 #include <algorithm>
 #include <cmath>
 
+#include "apps/run/run_parts.h"
 #include "core/angle.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"

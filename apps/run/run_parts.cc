@@ -7,7 +7,6 @@
 #include <map>
 #include <set>
 
-#include "apps/run/run_note.h"
 #include "core/median.h"
 #include "tutti/core/error.h"
 
@@ -119,8 +118,7 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 void CollectEarlierSessions(const RunState& state, RunResult& result) {
   result.map.value().earlier.assign(state.sessions.size() - 1, {});
   const Pose T_camera_body = result.rig.T_body_camera.Inverse();
-  const std::vector<int> pieces =
-      state.odometry->Pieces(FrameRange{state.FirstFrame(), std::numeric_limits<std::int64_t>::max()});
+  const std::vector<int> pieces = state.odometry->Pieces(state.Session());
   if (pieces.empty()) return;
   for (const int id : state.odometry->KeyframeIds()) {
     const std::int64_t frame = state.odometry->KeyframeFrameIndex(id);
@@ -153,8 +151,7 @@ void CollectMap(const RunState& state, RunResult& result) {
   result.peak_memory_mb = PeakMemoryMb();
   if (result.appearance_only) return;
   const Odometry& odometry = *state.odometry;
-  FrameRange session;
-  if (state.FirstFrame() > 0) session.first = state.FirstFrame();
+  const FrameRange session = state.Session();
   result.trajectory = BodyTrajectory(odometry.FrameTrajectory(-1, session), result.rig);
   result.frames_tracked = result.trajectory.size();
   const std::vector<int> pieces = odometry.Pieces(session);

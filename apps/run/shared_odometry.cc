@@ -3,12 +3,10 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "apps/run/attempts.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/progress.h"
-#include "apps/run/run_evaluation.h"
 #include "apps/run/run_parts.h"
 #include "apps/slam/loop_closing.h"
 #include "core/stopwatch.h"

@@ -6,10 +6,44 @@
 #include <vector>
 
 #include "apps/run/interrupt.h"
-#include "apps/run/run_note.h"
+#include "apps/slam/map_state.h"
 #include "apps/slam/trajectory_correction.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
+namespace {
+
+constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry without loops may follow
+
+}  // namespace
+
+template <class Archive>
+void State(Archive& archive, StampedPose& pose) {
+  archive(pose.stamp_s, pose.pose);
+}
+
+template <class Archive>
+void State(Archive& archive, BadFrame& bad) {
+  archive(bad.index, bad.error);
+}
+
+template <class Archive>
+void State(Archive& archive, LostStretch& lost) {
+  archive(lost.first, lost.last, lost.state, lost.reason);
+}
+
+template <class Archive>
+void State(Archive& archive, FoundFrame& found) {
+  archive(found.index, found.stamp_s, found.by_loop);
+}
+
+// What a result has already while the run goes on.
+template <class Archive>
+void StateOfGrowing(Archive& archive, RunResult& result) {
+  archive(result.frames_lost, result.frames_without_mask, result.frames_without_depth, result.bad,
+          result.bad_depth, result.lost, result.found, result.frame_ms, result.latency_ms,
+          result.frame_inliers, result.frames_by_grey_values);
+}
 
 SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Dataset& dataset,
                  const GivenOdometry* given, const std::filesystem::path& out, RunResult& result)
@@ -45,7 +79,7 @@ SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Datas
   result_.endless = dataset.FrameSupply() != Supply::kStored;
   result_.realtime = request.realtime;
   if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
-  clock_ = request.clock ? request.clock : std::make_shared<SteadyFrameClock>();
+  clock_ = request.clock ? request.clock : std::make_shared<FrameClock>();
   playback_.emplace(*clock_);
 }
 
@@ -107,7 +141,7 @@ void SlamRun::TrackUntouched() {
   if (!alone_) return;
   const std::size_t begin = alone_->last() < 0 ? 0 : so_far_.positions.at(alone_->last()) + 1;
   if (!TracksAlong() && begin < result_.frames_total)
-    result_.odometry_complete = TracksAfter() && TrackAgain(begin, result_.frames_total);
+    result_.odometry_complete = TracksTwice() && TrackAgain(begin, result_.frames_total);
   alone_->Finish();
   result_.odometry_alone_cpu_s = alone_->CpuSeconds();
 }
@@ -124,8 +158,7 @@ void SlamRun::Collect() {
   result_.graph = slam_->Graph();
   result_.graph_proof = slam_->GraphProof();
   if (given_ != nullptr && !slam_->AppearanceOnly()) CorrectGiven();
-  FrameRange session;
-  if (FirstFrame() > 0) session.first = FirstFrame();
+  const FrameRange session = State().Session();
   result_.given_odometry = given_ != nullptr;
   result_.followed = slam_->Followed();
   if (given_ != nullptr) {
@@ -185,7 +218,12 @@ PrefetchOptions SlamRun::Reading() {
   options.ahead = config_.run.threads > 1 ? 4 : 0;
   options.stop = &InterruptGuard::Requested;
   options.recorder = Recorder();
-  options.prepare = [this](InputFrame& frame) { Extract(frame); };
+  // Features need nothing from before, so they are extracted ahead of the tracking, too.
+  options.prepare = [this](InputFrame& frame) {
+    if (slam_->AppearanceOnly()) return;
+    const ScopedSpan span(Recorder(), Lane::kReading, "extract");
+    frame.features = slam_->odometry()->Extract(frame);
+  };
   if (request_.realtime && !playback_) {  // a camera keeps its own time
     options.ahead = 1;
     options.newest = true;
@@ -193,25 +231,11 @@ PrefetchOptions SlamRun::Reading() {
   return options;
 }
 
-void SlamRun::Extract(InputFrame& frame) {
-  if (slam_->AppearanceOnly()) return;
-  const ScopedSpan span(Recorder(), Lane::kReading, "extract");
-  frame.features = slam_->odometry()->Extract(frame);
-}
-
 void SlamRun::AwaitFrame(Prefetcher& frames) {
   std::size_t next = so_far_.next;
   while (next + 1 < Listed() && playback_->Due(dataset_.Stamp(next + 1))) ++next;
   frames.SkipTo(next);
   if (next < Listed()) playback_->Reach(dataset_.Stamp(next));
-}
-
-bool SlamRun::TracksAlong() const {
-  return config_.run.odometry_pass && !request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
-}
-
-bool SlamRun::TracksAfter() const {
-  return config_.run.odometry_pass && request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
 }
 
 bool SlamRun::TrackAgain(std::size_t begin, std::size_t end) {
@@ -319,6 +343,105 @@ std::string SlamRun::Status() const {
     status += "  loops " + std::to_string(CountAccepted(loops)) + "/" + std::to_string(loops.size());
   }
   return status;
+}
+
+// A run on disk: its checkpoints, and how it goes on from one, or in the map of another.
+
+template <class Archive>
+void SlamRun::State(Archive& archive) {
+  bool has_alone = alone_ != nullptr;
+  std::int64_t alone_last = has_alone ? alone_->last() : -1;
+  Trajectory live = live_.trajectory();
+  std::map<std::string, std::string> collected;
+  if constexpr (!Archive::kReading) {
+    for (const auto& observer : request_.observers) {
+      if (*observer->Name() != '\0') collected[observer->Name()] = observer->Save();
+    }
+  }
+  archive(so_far_, planted_, live, alone_last, has_alone, collected);
+  StateOfGrowing(archive, result_);
+  if constexpr (Archive::kReading) {
+    if (has_alone) resumed_alone_ = alone_last;
+    resumed_live_ = std::move(live);
+    for (const auto& observer : request_.observers) {
+      const auto found = collected.find(observer->Name());
+      if (found != collected.end()) observer->Load(found->second, request_.resume->string());
+    }
+  }
+}
+
+void SlamRun::WriteCheckpoint() {
+  so_far_.wall_s = WallSeconds();
+  so_far_.cpu_s = CpuSeconds();
+  std::optional<Odometry> alone;
+  if (alone_) alone = alone_->Tracked();
+  const auto write = [run = StateOf(*this), alone = std::move(alone)](const MapSink& sink) {
+    sink(kRunSection, run);
+    if (alone) alone->SaveSections(sink);
+  };
+  checkpoints_->Begin(slam_->Snapshot(NoteOf(request_)), write);
+}
+
+void SlamRun::EndCheckpoints(Progress& progress) {
+  checkpoints_->Wait();
+  if (!result_.interrupted) return;
+  WriteCheckpoint();
+  checkpoints_->Wait();
+  if (const auto problem = checkpoints_->TakeProblem()) {
+    progress.Note("tutti: warning: " + *problem);
+  } else {
+    progress.Note("tutti: go on with: tutti run --resume " + request_.out.string());
+  }
+}
+
+void SlamRun::GoOnIn(const std::filesystem::path& map) {
+  MapInfo info = ReadMapInfo(map);
+  if (!info.rig.calibrated || !result_.rig.calibrated)
+    throw InputError(map.string() +
+                     ": a recording can only go on in a map with poses, which needs calibrated "
+                     "cameras on both sides");
+  if (!info.config.run.loops || !config_.run.loops)
+    throw InputError(map.string() +
+                     ": without loop closure (run.loops, --no-loops) nothing would connect a "
+                     "recording with the map; both need it");
+  info.config = Watched(config_, request_);
+  slam_ = SlamSystem::Load(map, info, Recorder());
+  try {
+    slam_->BeginSession(result_.rig);
+  } catch (const InputError& error) {
+    throw InputError(map.string() + ": " + result_.dataset + " can't go on in it: " + error.what());
+  }
+  live_.Skip(LoopsBefore());
+}
+
+std::size_t SlamRun::LoopsBefore() const {
+  const std::int64_t first = FirstFrame();
+  return static_cast<std::size_t>(std::count_if(slam_->loops().begin(), slam_->loops().end(),
+                                                [&](const LoopRecord& l) { return l.query < first; }));
+}
+
+void SlamRun::Resume(const std::filesystem::path& checkpoint) {
+  MapInfo info = ReadMapInfo(checkpoint);
+  if (StateOf(info.rig) != StateOf(result_.rig))
+    throw InputError(checkpoint.string() + ": is of another camera than the data set has by now");
+  info.config = Watched(config_, request_);
+  slam_ = SlamSystem::Load(checkpoint, info, Recorder(), [this](internal::SectionReader& file) {
+    ReadState(file, kRunSection, this);
+    if (!resumed_alone_) return;
+    Odometry alone(config_.odometry, result_.rig);
+    alone.LoadSections(&file);
+    alone_ = std::make_unique<OdometryAlone>(alone, *resumed_alone_, AloneBeside());
+  });
+  live_.Skip(LoopsBefore());
+  live_.Resume(std::move(resumed_live_), slam_->loops());
+  before_ = so_far_;
+  for (const auto& [index, position] : so_far_.positions) {
+    if (position >= dataset_.Size() || dataset_.Number(position) != index)
+      throw InputError(checkpoint.string() + ": is of another data set than " + result_.dataset +
+                       " holds by now");
+  }
+  const std::size_t next = so_far_.next;
+  result_.resumed_from_frame = next < dataset_.Size() ? dataset_.Number(next) : info.last_frame + 1;
 }
 
 }  // namespace tutti

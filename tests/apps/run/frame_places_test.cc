@@ -1,5 +1,5 @@
 // Frames of a run by their stamps, those of earlier recordings by their numbers.
-#include "apps/run/frame_places.h"
+#include "apps/run/outputs.h"
 
 #include <gtest/gtest.h>
 

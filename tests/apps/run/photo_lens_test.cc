@@ -1,10 +1,9 @@
 // The focal length that photos name.
-#include "apps/run/photo_lens.h"
+#include "apps/run/recording.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "apps/run/recording.h"
 #include "tests/apps/run/photo.h"
 #include "tests/support/test_data.h"
 

@@ -1,5 +1,5 @@
 // A run's loops against ground truth.
-#include "apps/run/run_evaluation.h"
+#include "apps/run/run_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The word of a run, and its reasons.
-#include "apps/run/run_health.h"
+#include "apps/run/run_signs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

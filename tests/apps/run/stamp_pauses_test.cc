@@ -1,4 +1,4 @@
-#include "apps/run/stamp_pauses.h"
+#include "apps/run/frame_clock.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

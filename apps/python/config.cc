@@ -25,10 +25,10 @@ RunConfig ConfigOf(const std::optional<std::filesystem::path>& file, const py::k
 void BindConfig(py::module_& module) {
   py::class_<RunConfig>(
       module, "Config",
-      "Everything that a run can be told, as in the YAML files: sections dataset, camera, "
-      "odometry, loops, graph, run.\n\nConfig(\"tum.yaml\", run={\"threads\": 1}): each section is "
-      "a keyword and a dict; what it says wins over the file. `tutti run --help-config` and "
-      "describe(section) explain the keys. Raises tutti.InputError that names file and line.")
+      "Everything that a run can be told, as in the YAML files: sections dataset, camera, odometry, loops, "
+      "graph, run.\n\nConfig(\"tum.yaml\", run={\"threads\": 1}): each section is a keyword and a dict; what "
+      "it says wins over the file. `tutti run --help-config` and describe(section) explain the keys. Raises "
+      "tutti.InputError that names file and line.")
       .def(py::init(&ConfigOf), py::arg("file") = py::none())
       .def(Pickled<RunConfig>())
       .def("options", &OptionsOf, py::arg("section"), "The present values of a section.");

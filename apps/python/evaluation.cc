@@ -95,15 +95,11 @@ std::string DescribeEvaluation() {
   const auto line = [](const char* name, const char* text) { return std::string(name) + ": " + text + "\n"; };
   return std::string(
              "The errors of an estimate against a reference, with the conventions and numbers of evo: a dict "
-             "of "
-             "plain numbers, texts and lists, with the keys of `tutti evaluate --json` (docs/evaluation.md), "
-             "and "
-             "unless errors=False a dict \"errors\" of lists, one number for each pair: stamp [s], "
-             "translation "
-             "[m], rotation_deg. pandas.json_normalize makes a row of it.\n\n"
+             "of plain numbers, texts and lists, with the keys of `tutti evaluate --json` "
+             "(docs/evaluation.md), and unless errors=False a dict \"errors\" of lists, one number for each "
+             "pair: stamp [s], translation [m], rotation_deg. pandas.json_normalize makes a row of it.\n\n"
              "reference, estimate: a file (tum, kitti, euroc, g2o) or an array (N, 8): stamp [s], x, y, z "
-             "[m], qx, "
-             "qy, qz, qw.\nalignment: none, origin, se3, sim3 (one camera), scale or yaw.\n"
+             "[m], qx, qy, qz, qw.\nalignment: none, origin, se3, sim3 (one camera), scale or yaw.\n"
              "times: time stamps of files that have none (kitti, g2o).\n") +
          line("max_time_difference_s", doc::EvaluationOptions_max_time_difference_s) +
          line("time_offset_s", doc::EvaluationOptions_time_offset_s) +

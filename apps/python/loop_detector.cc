@@ -21,22 +21,17 @@ using Detector = Guarded<LoopDetector>;
 
 constexpr const char* kArguments =
     "\n\nimage: uint8 (H, W), uint8 (H, W, 3) or uint16 (H, W); colour is blue, green, red, as cv2.imread "
-    "gives it, or "
-    "red, green, blue with rgb=True. Not copied if its rows are contiguous.\n"
+    "gives it, or red, green, blue with rgb=True. Not copied if its rows are contiguous.\n"
     "depth: float32 (H, W) [m], registered to the image, 0 = unknown.\n"
     "camera: tutti.Camera; without it a loop comes without a pose.\n"
     "mask: uint8 or bool (H, W); there are no features where it is 0.\n"
     "member_features: {name: (keypoints, descriptors)} of members that need not extract; keypoints (N, 2) of "
-    "x, y [px] "
-    "(more columns: size, angle [deg], response), descriptors (N, D) of uint8 (Hamming) or float32 "
-    "(Euclidean). Of "
-    "dense_members {name: vector of float32}.\n"
+    "x, y [px] (more columns: size, angle [deg], response), descriptors (N, D) of uint8 (Hamming) or float32 "
+    "(Euclidean). Of dense_members {name: vector of float32}.\n"
     "features: (keypoints, descriptors) or (keypoints, descriptors, points) of your own for the "
-    "verification; points "
-    "(N, 3) in the camera frame [m], NaN where unknown.\n"
+    "verification; points (N, 3) in the camera frame [m], NaN where unknown.\n"
     "pose_prior: tutti.PosePrior. metric: false if the scale of the points drifts (one camera). stamp: [s], "
-    "for your own "
-    "records.";
+    "for your own records.";
 
 std::unique_ptr<Detector> MakeDetector(const MemberNames& external, const MemberNames& dense,
                                        const py::kwargs& keywords) {
@@ -117,9 +112,8 @@ void BindLoopDetector(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   const std::string text =
       std::string(doc::LoopDetector) +
-      " Several Python threads may call; one works, the others wait.\n\nKeywords, all optional, "
-      "with their defaults (external_members, dense_members: names of members whose features you "
-      "give to detect):\n" +
+      " Several Python threads may call; one works, the others wait.\n\nKeywords, all optional, with their "
+      "defaults (external_members, dense_members: names of members whose features you give to detect):\n" +
       DescribeOptions("loops");
   py::class_<Detector>(module, "LoopDetector", text.c_str())
       .def(py::init(&MakeDetector), py::kw_only(), "external_members"_a = MemberNames(),

@@ -178,26 +178,24 @@ void BindPoseGraph(py::module_& module) {
   const CertificateOptions defaults;
   RunConfig graphs;
   graphs.graph = PoseGraphOptions();
-  const std::string text =
-      std::string(doc::PoseGraph) +
-      "\n\nkind: se2, se3 or sim3 (one camera, whose scale drifts). Poses map points of the node into "
-      "the world: x, y, z [m], qx, qy, qz, qw, and for sim3 a scale; or a matrix of 4 x 4; se2 also "
-      "x, y, heading [rad].";
-  const std::string optimize = std::string(doc::PoseGraphOptimizer_Optimize) +
-                               " Ctrl-C gives up; the graph then has its poses of before. Keywords, all "
-                               "optional; SLAM graphs that may hold "
-                               "false loops should use robust=\"gnc\":\n" +
-                               DescribeOptions("graph", graphs);
+  const std::string text = std::string(doc::PoseGraph) +
+                           "\n\nkind: se2, se3 or sim3 (one camera, whose scale drifts). Poses map points of "
+                           "the node into the world: x, y, z [m], qx, qy, qz, qw, and for sim3 a scale; or a "
+                           "matrix of 4 x 4; se2 also x, y, heading [rad].";
+  const std::string optimize =
+      std::string(doc::PoseGraphOptimizer_Optimize) +
+      " Ctrl-C gives up; the graph then has its poses of before. Keywords, all optional; SLAM graphs that "
+      "may hold false loops should use robust=\"gnc\":\n" +
+      DescribeOptions("graph", graphs);
   py::class_<Graph>(module, "PoseGraph", text.c_str())
       .def(py::init([](const std::string& kind) { return std::make_unique<Graph>(PoseGraph(KindOf(kind))); }),
            "kind"_a = "se3")
-      .def_static(
-          "read_g2o", &ReadGraph, "file"_a, "bad_information"_a = "refuse", "ignore_unknown"_a = false,
-          (std::string(
-               "bad_information: refuse, project, diagonal or skip. ignore_unknown: lines whose tag is "
-               "not known are left out, with a warning. ") +
-           doc::ReadG2o)
-              .c_str())
+      .def_static("read_g2o", &ReadGraph, "file"_a, "bad_information"_a = "refuse",
+                  "ignore_unknown"_a = false,
+                  (std::string("bad_information: refuse, project, diagonal or skip. ignore_unknown: lines "
+                               "whose tag is not known are left out, with a warning. ") +
+                   doc::ReadG2o)
+                      .c_str())
       .def(
           "write_g2o",
           [](Graph& self, const fs::path& file) {
@@ -209,15 +207,11 @@ void BindPoseGraph(py::module_& module) {
           (std::string("A node. fixed: ") + doc::PoseGraphNode_fixed + ". " + doc::PoseGraph_AddNode).c_str())
       .def("add_edge", &AddEdge, "from_id"_a, "to_id"_a, "pose"_a, "information"_a = py::none(),
            py::kw_only(), "sigmas"_a = py::none(), "loop"_a = py::none(),
-           (std::string(
-                "A measurement: pose maps points of to_id into from_id. information: inverse "
-                "covariance, (6, 6) of "
-                "translation [1/m^2] and rotation [1/rad^2]; se2 (3, 3) of x, y, heading; sim3 (7, "
-                "7), log scale "
-                "last. Or sigmas=(translation [m], rotation [rad][, log scale]). loop: robust losses "
-                "act on loops "
-                "alone; None: an edge whose ids are not neighbours among those of the graph (and of one "
-                "robot) is one. ") +
+           (std::string("A measurement: pose maps points of to_id into from_id. information: inverse "
+                        "covariance, (6, 6) of translation [1/m^2] and rotation [1/rad^2]; se2 (3, 3) of x, "
+                        "y, heading; sim3 (7, 7), log scale last. Or sigmas=(translation [m], rotation "
+                        "[rad][, log scale]). loop: robust losses act on loops alone; None: an edge whose "
+                        "ids are not neighbours among those of the graph (and of one robot) is one. ") +
             doc::PoseGraph_AddEdge)
                .c_str())
       .def(
@@ -254,8 +248,7 @@ void BindPoseGraph(py::module_& module) {
             return Column<NodeId>(nodes.size(), [&](std::size_t k) { return nodes[k].id; });
           },
           "(N,) int64: of the nodes, in the order in which they were added. Ids of 2^63 and more in a file "
-          "are "
-          "negative here; write_g2o writes them as they were")
+          "are negative here; write_g2o writes them as they were")
       .def_property_readonly("landmark_ids", &LandmarkIds, "(L,) int64: of the landmarks of a file")
       .def_property_readonly(
           "landmarks", &LandmarkPositions,
@@ -271,8 +264,8 @@ void BindPoseGraph(py::module_& module) {
           "(N,) float64, parallel to ids: 1 unless the graph is sim3")
       .def_property_readonly(
           "edges", &EdgesOf,
-          "Columns, in the order in which edges were added: from, to (E,) int64; loop (E,) bool; "
-          "measurement (E, 7), x, y, z [m], qx, qy, qz, qw of T_from_to; scale (E,).")
+          "Columns, in the order in which edges were added: from, to (E,) int64; loop (E,) bool; measurement "
+          "(E, 7), x, y, z [m], qx, qy, qz, qw of T_from_to; scale (E,).")
       .def(
           "costs",
           [](Graph& self) {

@@ -101,10 +101,9 @@ void BindResults(py::module_& module) {
           "state", [](const TrackResult& result) { return ToString(result.state); },
           "initializing, tracking or lost")
       .def_readonly("reason", &TrackResult::reason, doc::TrackResult_reason)
-      .def_property_readonly(
-          "T_world_camera", &OptionalPose,
-          "(4, 4) float64; None if the frame has no pose. What it was then: trajectory() has what loops "
-          "made of it.")
+      .def_property_readonly("T_world_camera", &OptionalPose,
+                             "(4, 4) float64; None if the frame has no pose. What it was then: trajectory() "
+                             "has what loops made of it.")
       .def_readonly("features", &TrackResult::features, doc::TrackResult_features)
       .def_readonly("inliers", &TrackResult::inliers, doc::TrackResult_inliers)
       .def_readonly("keyframe", &TrackResult::keyframe, "id of the keyframe that this frame became, or -1")
@@ -185,15 +184,13 @@ void BindSlamSystem(py::module_& module) {
   using System = std::unique_ptr<SlamSystem>;
   const std::string text = std::string(doc::SlamSystem) +
                            "\n\nSlamSystem(dataset.rig, config, run={\"threads\": 1}): sections of the "
-                           "configuration are keywords, as in "
-                           "Config.";
+                           "configuration are keywords, as in Config.";
   py::class_<Slam>(module, "SlamSystem", text.c_str())
       .def(py::init(&MakeSlam), "rig"_a, "config"_a = py::none(),
            "Raises tutti.InputError if the configuration does not fit the rig.")
       .def_static("load", &LoadSlam, "file"_a, "threads"_a = py::none(),
                   "Goes on from a file that save wrote exactly as the saved one would have gone on, with so "
-                  "many threads "
-                  "(None: as saved). Raises tutti.InputError for a file that is not usable.")
+                  "many threads (None: as saved). Raises tutti.InputError for a file that is not usable.")
       .def(
           "track",
           [](Slam& slam, const InputFrame& frame) {

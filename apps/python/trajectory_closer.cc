@@ -88,12 +88,11 @@ void BindTrajectoryCloser(py::module_& module) {
                        const py::kwargs& sections) { return MakeCloser(rig, config, sections); }),
            "rig"_a, "config"_a = py::none(),
            "Raises tutti.InputError if the configuration does not fit the rig.")
-      .def(
-          "push", &Push, "frame"_a, "T_odom_body"_a, "sigma"_a = py::none(),
-          (std::string("`T_odom_body`: (4, 4), or (7,) of x, y, z [m], qx, qy, qz, qw. `sigma`: (translation "
-                       "[m], rotation [rad]), on each axis.\n\n") +
-           doc::TrajectoryCloser_Push)
-              .c_str())
+      .def("push", &Push, "frame"_a, "T_odom_body"_a, "sigma"_a = py::none(),
+           (std::string("`T_odom_body`: (4, 4), or (7,) of x, y, z [m], qx, qy, qz, qw. `sigma`: "
+                        "(translation [m], rotation [rad]), on each axis.\n\n") +
+            doc::TrajectoryCloser_Push)
+               .c_str())
       .def(
           "finish", [](TrajectoryCloser& c) { Free(c, [&](const TrajectoryCloser&) { c.Finish(); }); },
           doc::TrajectoryCloser_Finish)
@@ -104,8 +103,8 @@ void BindTrajectoryCloser(py::module_& module) {
           },
           (std::string("(4, 4) float64. ") + doc::TrajectoryCloser_T_map_odom).c_str())
       .def("corrected", &Corrected, "odometry"_a,
-           (std::string("`odometry` and what is returned: (N, 8) of stamp [s], x, y, z [m], qx, qy, qz, "
-                        "qw.\n\n") +
+           (std::string(
+                "`odometry` and what is returned: (N, 8) of stamp [s], x, y, z [m], qx, qy, qz, qw.\n\n") +
             doc::TrajectoryCloser_Corrected)
                .c_str())
       .def(
@@ -139,15 +138,13 @@ void BindTrajectoryCloser(py::module_& module) {
             return Free(c, [&](const TrajectoryCloser&) { return c.TakeWarnings(); });
           },
           doc::TrajectoryCloser_TakeWarnings);
-  module.def(
-      "close", &Close, "odometry"_a, "dataset"_a, "config"_a = py::none(), "max_gap_s"_a = 1.0,
-      "Loops for a whole recording: pushes each frame of `dataset` (Dataset) with the pose that "
-      "`odometry` has at its time, and finishes. `odometry`: (N, 8) of stamp [s], x, y, z [m], qx, qy, "
-      "qz, qw; T_odom_body. Poses are interpolated where they are at most `max_gap_s` [s] apart; other "
-      "frames are left out. Returns the TrajectoryCloser: corrected(odometry) is the corrected "
-      "trajectory. Warns if the images show "
-      "that the odometry is less certain than configured. Raises tutti.InputError if no frame has a "
-      "pose.");
+  module.def("close", &Close, "odometry"_a, "dataset"_a, "config"_a = py::none(), "max_gap_s"_a = 1.0,
+             "Loops for a whole recording: pushes each frame of `dataset` (Dataset) with the pose that "
+             "`odometry` has at its time, and finishes. `odometry`: (N, 8) of stamp [s], x, y, z [m], qx, "
+             "qy, qz, qw; T_odom_body. Poses are interpolated where they are at most `max_gap_s` [s] apart; "
+             "other frames are left out. Returns the TrajectoryCloser: corrected(odometry) is the corrected "
+             "trajectory. Warns if the images show that the odometry is less certain than configured. Raises "
+             "tutti.InputError if no frame has a pose.");
 }
 
 }  // namespace tutti::python

@@ -52,8 +52,8 @@ void TakeRawPairs(const RawCamera& left, const RawCamera& right, const std::stri
     const PinholeCamera raw_right = camera(right);
     if (!(baseline_m > 0))
       left.keys.Fail(left.keys.map(),
-                     "says how pairs are rectified, but not how far apart the cameras are "
-                     "(Camera.bf or focal_x_baseline)");
+                     "says how pairs are rectified, but not how far apart the cameras are (Camera.bf or "
+                     "focal_x_baseline)");
     Pose T;
     try {
       T = TransformOfRectified(R_left, R_right, baseline_m);

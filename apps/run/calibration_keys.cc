@@ -126,10 +126,10 @@ std::vector<double> NamedTerms(const CalibrationKeys& keys, const std::string& l
     const auto used = std::find_if(names.begin(), names.end(),
                                    [&](const char* known) { return std::string(known) == name; });
     if (used == names.end() && keys.Number({name}).value_or(0) != 0)
-      keys.Fail(keys.Find({name}).node, std::string("'") + name + "' is not 0, but the lens" +
-                                            (lens.empty() ? "" : " '" + lens + "'") +
-                                            " has no such coefficient; tutti has radtan (k1 k2 p1 p2 k3) and "
-                                            "equidistant (k1 k2 k3 k4)");
+      keys.Fail(
+          keys.Find({name}).node,
+          std::string("'") + name + "' is not 0, but the lens" + (lens.empty() ? "" : " '" + lens + "'") +
+              " has no such coefficient; tutti has radtan (k1 k2 p1 p2 k3) and equidistant (k1 k2 k3 k4)");
   }
   return any ? values : std::vector<double>();
 }

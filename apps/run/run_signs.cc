@@ -170,8 +170,8 @@ const std::vector<SignKind>& SignKinds() {
   static const std::vector<SignKind> kinds = {
       {"frames_posed", "share", "frames with a pose in trajectory.txt, of those that could be read", kBelow,
        0.95, 0.5, "only %s of the frames have a pose in trajectory.txt",
-       "frames.lost_stretches in summary.json says where and why; slower motion, more light or more frames "
-       "a second help",
+       "frames.lost_stretches in summary.json says where and why; slower motion, more light or more frames a "
+       "second help",
        [](const RunResult& r) { return Share(static_cast<double>(r.frames_tracked), FramesRead(r)); }},
       {"largest_piece", "share", "poses in trajectory.txt, of those in all submaps", kBelow, 0.95, 0.5,
        "the map consists of several submaps: only %s of the poses are in trajectory.txt",
@@ -233,12 +233,11 @@ const std::vector<SignKind>& SignKinds() {
        "check focal length and baseline or depth scale, and that images and depth are of the same time",
        [](const RunResult& r) { return If(HasMap(r) && !IsMono(r), r.map_figures.depth_misfit); }},
       {"focal_length_off", "share",
-       "how far, at least, the focal length that fits the map best is from the given one (less 1.25 "
-       "standard deviations)",
+       "how far, at least, the focal length that fits the map best is from the given one (less 1.25 standard "
+       "deviations)",
        kAbove, 0.02, kNever, "the map fits another focal length better, at least %s away",
        "check fx and fy; without --config and --camera tutti run measures them, and "
-       "focal_length.better_camera in "
-       "summary.json is what the whole map says then",
+       "focal_length.better_camera in summary.json is what the whole map says then",
        FocalLengthOff},
       {"lens_off", "share",
        "radial distortion that the calibration left over, at the middle of the image's side edge", kAbove,
@@ -261,8 +260,7 @@ const std::vector<SignKind>& SignKinds() {
        [](const RunResult& r) { return ErrorOver(r, &RunEvaluation::extent_m); }},
       {"scale_off", "factor",
        "stereo and depth images, with ground truth: factor, at least, between the scale of the trajectory "
-       "and "
-       "that of the ground truth",
+       "and that of the ground truth",
        kAbove, 1.05, 1.5, "the ground truth says that the scale is off by a factor of %s at least",
        "check the depth scale (--set dataset.depth_units_per_m=1000 for millimetres), the baseline or the "
        "focal length",

@@ -397,13 +397,13 @@ void SlamRun::EndCheckpoints(Progress& progress) {
 void SlamRun::GoOnIn(const std::filesystem::path& map) {
   MapInfo info = ReadMapInfo(map);
   if (!info.rig.calibrated || !result_.rig.calibrated)
-    throw InputError(map.string() +
-                     ": a recording can only go on in a map with poses, which needs calibrated "
-                     "cameras on both sides");
+    throw InputError(
+        map.string() +
+        ": a recording can only go on in a map with poses, which needs calibrated cameras on both sides");
   if (!info.config.run.loops || !config_.run.loops)
     throw InputError(map.string() +
-                     ": without loop closure (run.loops, --no-loops) nothing would connect a "
-                     "recording with the map; both need it");
+                     ": without loop closure (run.loops, --no-loops) nothing would connect a recording with "
+                     "the map; both need it");
   info.config = Watched(config_, request_);
   slam_ = SlamSystem::Load(map, info, Recorder());
   try {

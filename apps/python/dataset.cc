@@ -8,13 +8,10 @@
 #include <string>
 #include <utility>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/images.h"
-#include "apps/python/interrupts.h"
-#include "apps/python/options.h"
 #include "apps/python/pickled.h"
-#include "apps/python/poses.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/features.h"
 

@@ -3,9 +3,9 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/pickled.h"
-#include "apps/python/poses.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::python {

@@ -9,30 +9,24 @@
 #include <optional>
 #include <string>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/guarded.h"
-#include "apps/python/images.h"
-#include "apps/python/options.h"
 #include "apps/python/pickled.h"
-#include "apps/python/poses.h"
 
 namespace tutti::python {
 namespace {
 
 namespace fs = std::filesystem;
 
-using Slam = Guarded<std::unique_ptr<SlamSystem>>;
+using Slam = Guarded<SlamSystem>;
 
 std::unique_ptr<Slam> MakeSlam(const CameraRig& rig, const std::optional<RunConfig>& config,
                                const py::kwargs& sections) {
   RunConfig all = config.value_or(RunConfig());
   SetOptions("SlamSystem", "", sections, all);
-  const auto make = [&] {
-    const py::gil_scoped_release release;
-    return std::make_unique<Slam>(std::make_unique<SlamSystem>(all, rig));
-  };
-  return make();
+  const py::gil_scoped_release release;
+  return std::make_unique<Slam>(std::make_unique<SlamSystem>(all, rig));
 }
 
 std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads) {
@@ -50,9 +44,9 @@ std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads)
 // With the odometry, which a rig without calibration has none of.
 template <class Work>
 auto WithOdometry(Slam& slam, Work work) {
-  return slam.Run([&](std::unique_ptr<SlamSystem>& s) {
-    if (s->AppearanceOnly()) throw InputError("the rig has no calibration: there are loops but no poses");
-    return work(*s->odometry());
+  return slam.Run([&](SlamSystem& s) {
+    if (s.AppearanceOnly()) throw InputError("the rig has no calibration: there are loops but no poses");
+    return work(*s.odometry());
   });
 }
 
@@ -181,7 +175,6 @@ void BindSlamSystem(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   BindResults(module);
   BindKeyframe(module);
-  using System = std::unique_ptr<SlamSystem>;
   const std::string text = std::string(doc::SlamSystem) +
                            "\n\nSlamSystem(dataset.rig, config, run={\"threads\": 1}): sections of the "
                            "configuration are keywords, as in Config.";
@@ -191,30 +184,17 @@ void BindSlamSystem(py::module_& module) {
       .def_static("load", &LoadSlam, "file"_a, "threads"_a = py::none(),
                   "Goes on from a file that save wrote exactly as the saved one would have gone on, with so "
                   "many threads (None: as saved). Raises tutti.InputError for a file that is not usable.")
-      .def(
-          "track",
-          [](Slam& slam, const InputFrame& frame) {
-            return slam.Run([&](System& s) { return s->Track(frame); });
-          },
-          "frame"_a, doc::SlamSystem_Track)
-      .def(
-          "finish", [](Slam& slam) { slam.Run([](System& s) { s->Finish(); }); }, doc::SlamSystem_Finish)
+      .def("track", Locked(&SlamSystem::Track), "frame"_a, doc::SlamSystem_Track)
+      .def("finish", Locked(&SlamSystem::Finish), doc::SlamSystem_Finish)
       .def(
           "save",
           [](Slam& slam, const fs::path& file) {
-            Writing([&] { slam.Run([&](System& s) { s->Save(file); }); });
+            Writing([&] { slam.Run([&](SlamSystem& s) { s.Save(file); }); });
           },
           "file"_a, doc::SlamSystem_Save)
-      .def(
-          "begin_localization", [](Slam& slam) { slam.Run([](System& s) { s->BeginLocalization(); }); },
-          doc::SlamSystem_BeginLocalization)
-      .def(
-          "begin_session",
-          [](Slam& slam, const CameraRig& rig) { slam.Run([&](System& s) { s->BeginSession(rig); }); },
-          "rig"_a, doc::SlamSystem_BeginSession)
-      .def(
-          "prune", [](Slam& slam) { return slam.Run([](System& s) { return s->Prune(); }); },
-          doc::SlamSystem_Prune)
+      .def("begin_localization", Locked(&SlamSystem::BeginLocalization), doc::SlamSystem_BeginLocalization)
+      .def("begin_session", Locked(&SlamSystem::BeginSession), "rig"_a, doc::SlamSystem_BeginSession)
+      .def("prune", Locked(&SlamSystem::Prune), doc::SlamSystem_Prune)
       .def(
           "trajectory",
           [](Slam& slam, int piece) {
@@ -231,31 +211,18 @@ void BindSlamSystem(py::module_& module) {
           [](Slam& slam) { return WithOdometry(slam, [](const Odometry& o) { return o.KeyframeIds(); }); },
           doc::Odometry_KeyframeIds)
       .def("landmarks", &Landmarks, "(N, 3) float64: points of the map in the world [m], by id.")
-      .def_property_readonly(
-          "loops", [](Slam& slam) { return slam.Run([](System& s) { return s->loops(); }); },
-          doc::SlamSystem_loops)
+      .def_property_readonly("loops", Locked(&SlamSystem::loops), doc::SlamSystem_loops)
       .def(
           "graph",
-          [](Slam& slam) {
-            return std::make_unique<Guarded<PoseGraph>>(slam.Run([](System& s) { return s->Graph(); }));
-          },
+          [](Slam& slam) { return std::make_unique<Guarded<PoseGraph>>(Locked(&SlamSystem::Graph)(slam)); },
           doc::SlamSystem_Graph)
-      .def_property_readonly(
-          "appearance_only",
-          [](Slam& slam) { return slam.Run([](System& s) { return s->AppearanceOnly(); }); },
-          doc::SlamSystem_AppearanceOnly)
-      .def_property_readonly(
-          "corrections", [](Slam& slam) { return slam.Run([](System& s) { return s->Corrections(); }); },
-          doc::SlamSystem_Corrections)
-      .def_property_readonly(
-          "relocalized", [](Slam& slam) { return slam.Run([](System& s) { return s->Relocalized(); }); },
-          doc::SlamSystem_Relocalized)
-      .def(
-          "take_warnings", [](Slam& slam) { return slam.Run([](System& s) { return s->TakeWarnings(); }); },
-          doc::SlamSystem_TakeWarnings)
-      .def_property_readonly(
-          "stage_ms", [](Slam& slam) { return slam.Run([](System& s) { return s->StageMilliseconds(); }); },
-          doc::SlamSystem_StageMilliseconds);
+      .def_property_readonly("appearance_only", Locked(&SlamSystem::AppearanceOnly),
+                             doc::SlamSystem_AppearanceOnly)
+      .def_property_readonly("corrections", Locked(&SlamSystem::Corrections), doc::SlamSystem_Corrections)
+      .def_property_readonly("relocalized", Locked(&SlamSystem::Relocalized), doc::SlamSystem_Relocalized)
+      .def("take_warnings", Locked(&SlamSystem::TakeWarnings), doc::SlamSystem_TakeWarnings)
+      .def_property_readonly("stage_ms", Locked(&SlamSystem::StageMilliseconds),
+                             doc::SlamSystem_StageMilliseconds);
 }
 
 }  // namespace tutti::python

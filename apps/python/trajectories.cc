@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <optional>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/poses.h"
 #include "tutti/backend/trajectory_file.h"
 
 namespace tutti::python {

@@ -1,5 +1,4 @@
-#include "apps/report/comparison_report.h"
-
+// Pages over several runs, and the reports of runs that they are made of.
 #include <algorithm>
 #include <cstddef>
 #include <map>

@@ -10,9 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "apps/report/base64.h"
-#include "apps/report/detection_log.h"
-#include "apps/run/run_result.h"
+#include "apps/report/page.h"
+#include "apps/report/run_report.h"
 #include "tutti/loopclosure/ground_truth.h"
 
 namespace tutti::report {

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "apps/report/build_info.h"
-#include "apps/report/page.h"
 #include "apps/report/report_parts.h"
 #include "apps/run/outputs.h"
 #include "apps/run/timing.h"
@@ -21,28 +19,26 @@ constexpr std::size_t kMostErrors = 1500;
 constexpr std::size_t kMostFrameTimes = 1000;
 constexpr double kMaxDifference = 0.01;  // of time stamps [s], as the run's own evaluation
 
-Json PathJson(const Trajectory& trajectory, const Similarity& alignment) {
-  Json t = Json::array(), x = t, y = t, z = t;
-  const double origin = trajectory.empty() ? 0 : trajectory.front().stamp_s;
-  for (const std::size_t k : Thinned(trajectory.size(), kMostPoses)) {
-    const Eigen::Vector3d p = alignment * trajectory[k].pose.translation;
-    t.push_back(Rounded(trajectory[k].stamp_s - origin, 3));
-    x.push_back(Rounded(p.x(), 4));
-    y.push_back(Rounded(p.y(), 4));
-    z.push_back(Rounded(p.z(), 4));
-  }
-  return {{"t", t}, {"x", x}, {"y", y}, {"z", z}};
-}
-
-Json PointsJson(const std::vector<Eigen::Vector3d>& points, const Similarity& alignment) {
+Json PointsJson(const std::vector<Eigen::Vector3d>& points, const Similarity& alignment, int decimals) {
   Json x = Json::array(), y = x, z = x;
   for (const Eigen::Vector3d& point : points) {
     const Eigen::Vector3d p = alignment * point;
-    x.push_back(Rounded(p.x(), 3));
-    y.push_back(Rounded(p.y(), 3));
-    z.push_back(Rounded(p.z(), 3));
+    x.push_back(Rounded(p.x(), decimals));
+    y.push_back(Rounded(p.y(), decimals));
+    z.push_back(Rounded(p.z(), decimals));
   }
   return {{"x", x}, {"y", y}, {"z", z}};
+}
+
+Json PathJson(const Trajectory& trajectory, const Similarity& alignment) {
+  Json path = {{"t", Json::array()}};
+  std::vector<Eigen::Vector3d> points;
+  for (const std::size_t k : Thinned(trajectory.size(), kMostPoses)) {
+    path["t"].push_back(Rounded(trajectory[k].stamp_s - trajectory.front().stamp_s, 3));
+    points.push_back(trajectory[k].pose.translation);
+  }
+  path.update(PointsJson(points, alignment, 4));
+  return path;
 }
 
 Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
@@ -225,7 +221,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["earlier"] = Json::array();
   for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k)
     json["earlier"].push_back(PathJson(result.map->earlier[k], align_slam));
-  json["landmarks"] = PointsJson(log.landmarks(), align_slam);
+  json["landmarks"] = PointsJson(log.landmarks(), align_slam, 3);
   json["found"] = FoundJson(result, align_slam);
   json["loops"] = EdgesJson(result, loops, align_slam);
   json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <unordered_map>
 
-#include "apps/report/base64.h"
+#include "apps/report/page.h"
 #include "apps/view/live_server.h"
 
 namespace tutti::view {

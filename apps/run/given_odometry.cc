@@ -73,10 +73,69 @@ class DepthBeside : public DatasetAround {
   /// paired in the order of their names if there are as many, else by the stamps that they are called by
   /// (max_association_s). Throws InputError if neither works.
   DepthBeside(std::unique_ptr<Dataset> images, const std::vector<double>& stamps, const fs::path& depth,
-              const DatasetOptions& options);
+              const DatasetOptions& options)
+      : DatasetAround(std::move(images)),
+        options_(options),
+        rig_(images_->Rig()),
+        warnings_(images_->Warnings()) {
+    rig_.sensor = Sensor::kRgbd;
+    rig_.max_depth_m = options.max_depth_m;
+    if (options.camera && options.camera->distortion != Distortion::kNone) {
+      const PinholeCamera stored = TurnedCamera(rig_.camera, (360 - options.rotate) % 360);
+      PinholeCamera camera = *options.camera;  // of the images' size, as OpenDataset has checked
+      camera.width = stored.width;
+      camera.height = stored.height;
+      rectifier_.emplace(camera);
+    }
+    std::vector<fs::path> found;
+    for (RoleImage& image : ImagesOf(depth, {""})) found.push_back(std::move(image.file));
+    if (found.empty()) throw InputError(depth.string() + ": holds no depth image (--depth)");
+    const bool upright = options.rotate % 180 == 0;
+    const cv::Size turned(rig_.camera.width, rig_.camera.height);
+    reader_.emplace(options, DepthFormat(), options.camera,
+                    upright ? turned : cv::Size(turned.height, turned.width));
+    for (std::string& note : reader_->Notes(found.front())) warnings_.push_back(std::move(note));
+    if (found.size() == stamps.size()) {
+      files_ = found;
+      return;
+    }
+    const auto named = StampsInNames(found).stamps;
+    files_.resize(stamps.size());
+    std::size_t alone = stamps.size();
+    for (std::size_t i = 0; i < stamps.size() && !named.empty(); ++i) {
+      const auto later = std::lower_bound(named.begin(), named.end(), stamps[i],
+                                          [](const auto& stamp, double s) { return stamp.first < s; });
+      auto nearest = later;
+      if (later == named.end() ||
+          (later != named.begin() && stamps[i] - (later - 1)->first < later->first - stamps[i]))
+        nearest = later - 1;
+      if (std::abs(nearest->first - stamps[i]) > options.max_association_s) continue;
+      files_[i] = found[nearest->second];
+      --alone;
+    }
+    if (alone == stamps.size())
+      throw InputError(
+          depth.string() + ": has " + std::to_string(found.size()) + " depth images for " +
+          std::to_string(stamps.size()) +
+          " images, and their names are no time stamps near those of the images; give as many, or "
+          "name them by their time");
+    if (alone > 0)
+      warnings_.push_back(depth.string() + ": " + std::to_string(alone) + " of " +
+                          std::to_string(stamps.size()) + " images have no depth image within " +
+                          std::to_string(options.max_association_s) + " s");
+  }
 
   /// With depth, or with depth_error.
-  ReadResult Read(std::size_t i) const override;
+  ReadResult Read(std::size_t i) const override {
+    ReadResult result = images_->Read(i);
+    if (!result.frame) return result;
+    const fs::path& file = files_.at(static_cast<std::size_t>(Number(i)));
+    if (file.empty()) return result;
+    cv::Mat metres;
+    result.depth_error = reader_->Read(file, rectifier_ ? &*rectifier_ : nullptr, metres);
+    if (result.depth_error.empty()) result.frame->depth_m = TurnedImage(metres, options_.rotate);
+    return result;
+  }
   const CameraRig& Rig() const override { return rig_; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
 
@@ -88,69 +147,6 @@ class DepthBeside : public DatasetAround {
   std::vector<fs::path> files_;  // of each image; empty: none
   std::vector<std::string> warnings_;
 };
-
-DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<double>& stamps,
-                         const fs::path& depth, const DatasetOptions& options)
-    : DatasetAround(std::move(images)),
-      options_(options),
-      rig_(images_->Rig()),
-      warnings_(images_->Warnings()) {
-  rig_.sensor = Sensor::kRgbd;
-  rig_.max_depth_m = options.max_depth_m;
-  if (options.camera && options.camera->distortion != Distortion::kNone) {
-    const PinholeCamera stored = TurnedCamera(rig_.camera, (360 - options.rotate) % 360);
-    PinholeCamera camera = *options.camera;  // of the images' size, as OpenDataset has checked
-    camera.width = stored.width;
-    camera.height = stored.height;
-    rectifier_.emplace(camera);
-  }
-  std::vector<fs::path> found;
-  for (RoleImage& image : ImagesOf(depth, {""})) found.push_back(std::move(image.file));
-  if (found.empty()) throw InputError(depth.string() + ": holds no depth image (--depth)");
-  const bool upright = options.rotate % 180 == 0;
-  const cv::Size turned(rig_.camera.width, rig_.camera.height);
-  reader_.emplace(options, DepthFormat(), options.camera,
-                  upright ? turned : cv::Size(turned.height, turned.width));
-  for (std::string& note : reader_->Notes(found.front())) warnings_.push_back(std::move(note));
-  if (found.size() == stamps.size()) {
-    files_ = found;
-    return;
-  }
-  const auto named = StampsInNames(found).stamps;
-  files_.resize(stamps.size());
-  std::size_t alone = stamps.size();
-  for (std::size_t i = 0; i < stamps.size() && !named.empty(); ++i) {
-    const auto later = std::lower_bound(named.begin(), named.end(), stamps[i],
-                                        [](const auto& stamp, double s) { return stamp.first < s; });
-    auto nearest = later;
-    if (later == named.end() ||
-        (later != named.begin() && stamps[i] - (later - 1)->first < later->first - stamps[i]))
-      nearest = later - 1;
-    if (std::abs(nearest->first - stamps[i]) > options.max_association_s) continue;
-    files_[i] = found[nearest->second];
-    --alone;
-  }
-  if (alone == stamps.size())
-    throw InputError(depth.string() + ": has " + std::to_string(found.size()) + " depth images for " +
-                     std::to_string(stamps.size()) +
-                     " images, and their names are no time stamps near those of the images; give as many, or "
-                     "name them by their time");
-  if (alone > 0)
-    warnings_.push_back(depth.string() + ": " + std::to_string(alone) + " of " +
-                        std::to_string(stamps.size()) + " images have no depth image within " +
-                        std::to_string(options.max_association_s) + " s");
-}
-
-ReadResult DepthBeside::Read(std::size_t i) const {
-  ReadResult result = images_->Read(i);
-  if (!result.frame) return result;
-  const fs::path& file = files_.at(static_cast<std::size_t>(Number(i)));
-  if (file.empty()) return result;
-  cv::Mat metres;
-  result.depth_error = reader_->Read(file, rectifier_ ? &*rectifier_ : nullptr, metres);
-  if (result.depth_error.empty()) result.frame->depth_m = TurnedImage(metres, options_.rotate);
-  return result;
-}
 
 // All images, whatever part of them is to be used.
 DatasetOptions Whole(DatasetOptions options) {
@@ -168,6 +164,11 @@ bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
 
 bool Grows(const std::vector<double>& stamps) {
   return std::adjacent_find(stamps.begin(), stamps.end(), std::greater_equal<>()) == stamps.end();
+}
+
+Trajectory::const_iterator NotBefore(const Trajectory& trajectory, double stamp_s) {
+  return std::lower_bound(trajectory.begin(), trajectory.end(), stamp_s,
+                          [](const StampedPose& pose, double s) { return pose.stamp_s < s; });
 }
 
 PoseFile ReadPoses(const GivenOdometryFiles& files, const std::vector<double>& times) {
@@ -231,7 +232,12 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   }
   as_given_ = trajectory_;
   trajectory_ = WithoutOutliers(std::move(trajectory_), jumps_);
-  SumUp(files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas);
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const MotionSigma& sigma :
+       files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas) {
+    if (!variances_.empty()) sum += Eigen::Vector2d(sigma.translation_m, sigma.rotation_rad).cwiseAbs2();
+    variances_.push_back(sum);
+  }
 }
 
 // Lines have no stamps: one for each image, in order, or the images that they number.
@@ -255,17 +261,8 @@ void GivenOdometry::StampByOrder(bool numbered, const Dataset& all) {
   for (std::size_t i = 0; i < trajectory_.size(); ++i) trajectory_[i].stamp_s = stamp(i);
 }
 
-void GivenOdometry::SumUp(const std::vector<MotionSigma>& sigmas) {
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (std::size_t i = 0; i < sigmas.size(); ++i) {
-    if (i > 0) sum += Eigen::Vector2d(sigmas[i].translation_m, sigmas[i].rotation_rad).cwiseAbs2();
-    variances_.push_back(sum);
-  }
-}
-
 Eigen::Vector2d GivenOdometry::Variance(double stamp_s) const {
-  const auto later = std::lower_bound(trajectory_.begin(), trajectory_.end(), stamp_s,
-                                      [](const StampedPose& p, double s) { return p.stamp_s < s; });
+  const auto later = NotBefore(trajectory_, stamp_s);
   if (later == trajectory_.begin()) return variances_.front();
   if (later == trajectory_.end()) return variances_.back();
   const auto i = static_cast<std::size_t>(later - trajectory_.begin());
@@ -335,8 +332,7 @@ std::unique_ptr<Dataset> GivenOdometry::Open() const {
 }
 
 std::optional<Pose> GivenOdometry::At(double stamp_s) const {
-  const auto later = std::lower_bound(trajectory_.begin(), trajectory_.end(), stamp_s,
-                                      [](const StampedPose& p, double s) { return p.stamp_s < s; });
+  const auto later = NotBefore(trajectory_, stamp_s);
   if (later != trajectory_.end() && later->stamp_s - stamp_s < 1e-6) return later->pose;
   if (auto pose = InterpolatePose(trajectory_, stamp_s, kLongestGap)) return pose;
   auto nearest = later;

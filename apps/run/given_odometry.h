@@ -48,7 +48,6 @@ class GivenOdometry {
  private:
   std::vector<double> ImageStamps(const Dataset& all, bool numbered);
   void StampByOrder(bool numbered, const Dataset& all);
-  void SumUp(const std::vector<MotionSigma>& sigmas);
   Eigen::Vector2d Variance(double stamp_s) const;
 
   GivenOdometryFiles files_;

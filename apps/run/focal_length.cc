@@ -138,21 +138,22 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
   return {summary.IsSolutionUsable(), summary.final_cost, summary.num_residuals_reduced};
 }
 
-// So many in a row between which the camera turns most.
-std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& keyframes, std::size_t most) {
-  if (keyframes.size() <= most) return keyframes;
+// Keyframes in a row between which the camera turns most.
+std::vector<int> WhereItTurns(const Odometry& odometry, const FrameRange& session) {
+  const std::vector<int> keyframes = KeyframesOfLargestSubmap(odometry, session);
+  if (keyframes.size() <= kCheckedKeyframes) return keyframes;
   std::vector<double> turned = {0};  // up to each keyframe
   for (std::size_t k = 1; k < keyframes.size(); ++k) {
     const Pose before = odometry.KeyframePose(keyframes[k - 1]), here = odometry.KeyframePose(keyframes[k]);
     turned.push_back(turned.back() + (before.Inverse() * here).Angle());
   }
   std::size_t best = 0;
-  const auto turn = [&](std::size_t begin) { return turned[begin + most - 1] - turned[begin]; };
-  for (std::size_t begin = 1; begin + most <= keyframes.size(); ++begin) {
+  const auto turn = [&](std::size_t begin) { return turned[begin + kCheckedKeyframes - 1] - turned[begin]; };
+  for (std::size_t begin = 1; begin + kCheckedKeyframes <= keyframes.size(); ++begin) {
     if (turn(begin) > turn(best)) best = begin;
   }
   const auto first = keyframes.begin() + static_cast<std::ptrdiff_t>(best);
-  return {first, first + static_cast<std::ptrdiff_t>(most)};
+  return {first, first + static_cast<std::ptrdiff_t>(kCheckedKeyframes)};
 }
 
 // Landmarks that three of the keyframes see, those seen most first. `aspect`: fy over fx, by which offsets
@@ -165,15 +166,11 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
     views.push_back(odometry.Keyframe(id));
     for (const int landmark : views.back().landmarks) ++seen[landmark];
   }
-  std::vector<LandmarkView> landmarks = odometry.Landmarks();
-  for (LandmarkView& landmark : landmarks) {
-    const auto found = seen.find(landmark.id);
-    landmark.observations = found == seen.end() ? 0 : found->second;
+  std::vector<LandmarkView> landmarks;
+  for (LandmarkView& landmark : odometry.Landmarks()) {
+    landmark.observations = seen[landmark.id];
+    if (landmark.observations >= 3 && landmark.position.allFinite()) landmarks.push_back(landmark);
   }
-  landmarks.erase(
-      std::remove_if(landmarks.begin(), landmarks.end(),
-                     [](const LandmarkView& l) { return l.observations < 3 || !l.position.allFinite(); }),
-      landmarks.end());
   std::stable_sort(landmarks.begin(), landmarks.end(), [](const LandmarkView& a, const LandmarkView& b) {
     return a.observations > b.observations;
   });
@@ -371,9 +368,8 @@ FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session, d
   const double cpu_begin = ProcessCpuSeconds();
   FocalLength result;
   result.camera = odometry.Rig().camera;
-  const std::optional<Scene> scene = SceneOf(
-      odometry, WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes),
-      kCheckedLandmarks, result.camera.fy / result.camera.fx);
+  const std::optional<Scene> scene = SceneOf(odometry, WhereItTurns(odometry, session), kCheckedLandmarks,
+                                             result.camera.fy / result.camera.fx);
   const std::optional<Estimate> found = scene ? EstimateOf(*scene, kAnyMove) : std::nullopt;
   if (found && IsLens(std::exp(found->lens[0]), result.camera.width)) {
     result.sigma = std::hypot(found->sigma, lens_sigma);
@@ -391,9 +387,7 @@ FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session, d
 
 LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
   LensCheck check;
-  const std::vector<int> keyframes =
-      WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes);
-  std::optional<Scene> scene = SceneOf(odometry, keyframes, kCheckedLandmarks);
+  std::optional<Scene> scene = SceneOf(odometry, WhereItTurns(odometry, session), kCheckedLandmarks);
   if (!scene) return check;
   // A wrong focal length and a wrong lens look nearly the same, and seldom are both wrong.
   Scene kept = *scene;

@@ -100,7 +100,11 @@ void SlamRun::TrackAll() {
     if (!fetched) break;
     TakeFrame(*fetched, progress);
     NoteWarnings(progress);
-    progress.Update(++so_far_.next, Status());
+    std::string status = so_far_.state;
+    if (config_.run.loops)
+      status += "  loops " + std::to_string(CountAccepted(slam_->loops())) + "/" +
+                std::to_string(slam_->loops().size());
+    progress.Update(++so_far_.next, status);
   }
   result_.interrupted = InterruptGuard::Requested();
   if (checkpoints_) EndCheckpoints(progress);
@@ -157,7 +161,14 @@ void SlamRun::Collect() {
   result_.global_adjustments = slam_->GlobalAdjustments();
   result_.graph = slam_->Graph();
   result_.graph_proof = slam_->GraphProof();
-  if (given_ != nullptr && !slam_->AppearanceOnly()) CorrectGiven();
+  if (given_ != nullptr && !slam_->AppearanceOnly()) {  // every pose of it, as the keyframes are now
+    Trajectory before;
+    for (const StampedPose& keyframe : result_.keyframe_trajectory)
+      before.push_back({keyframe.stamp_s, given_->At(keyframe.stamp_s).value()});
+    result_.trajectory_odometry = given_->trajectory();
+    result_.trajectory =
+        CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory, given_->jumps());
+  }
   const FrameRange session = State().Session();
   result_.given_odometry = given_ != nullptr;
   result_.followed = slam_->Followed();
@@ -187,15 +198,6 @@ void SlamRun::NoteJoining(const MapSession& own) {
   const auto position = so_far_.positions.find(*own.joined_at);
   if (position != so_far_.positions.end())
     result_.found.push_back({*own.joined_at, dataset_.Stamp(position->second), true});
-}
-
-void SlamRun::CorrectGiven() {
-  Trajectory before;
-  for (const StampedPose& keyframe : result_.keyframe_trajectory)
-    before.push_back({keyframe.stamp_s, given_->At(keyframe.stamp_s).value()});
-  result_.trajectory_odometry = given_->trajectory();
-  result_.trajectory =
-      CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory, given_->jumps());
 }
 
 TrackResult SlamRun::Track(const InputFrame& frame) {
@@ -334,15 +336,6 @@ void SlamRun::TrackOne(const InputFrame& frame) {
     so_far_.lost_open = true;
   }
   result_.lost.back().last = frame.index;
-}
-
-std::string SlamRun::Status() const {
-  std::string status = so_far_.state;
-  if (config_.run.loops) {
-    const std::vector<LoopRecord>& loops = slam_->loops();
-    status += "  loops " + std::to_string(CountAccepted(loops)) + "/" + std::to_string(loops.size());
-  }
-  return status;
 }
 
 // A run on disk: its checkpoints, and how it goes on from one, or in the map of another.

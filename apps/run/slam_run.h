@@ -93,8 +93,6 @@ class SlamRun {
   std::string Trace() const { return ChromeTrace(recorder_.Spans(), begin_); }
 
  private:
-  // Every pose of the other odometry, as the keyframes are now.
-  void CorrectGiven();
   TrackResult Track(const InputFrame& frame);
   RunState State() const {
     return {slam_->odometry(), slam_->loops(), slam_->Corrections(), recognised_, session_offsets_};
@@ -131,7 +129,6 @@ class SlamRun {
   std::size_t LoopsBefore() const;
   void Resume(const std::filesystem::path& checkpoint);
   void TrackOne(const InputFrame& frame);
-  std::string Status() const;
 
   const RunRequest& request_;
   const RunConfig& config_;

@@ -80,28 +80,24 @@ TEST(Recording, OfKittiWithTwoCamerasIsStereoWithItsOwnCalibration) {
   EXPECT_THAT(town.findings[2], HasSubstr("calib.txt"));
   const auto dataset = OpenDataset(folder, town.config.dataset);
   EXPECT_GT(dataset->Rig().baseline_m, 0.1);
+  EXPECT_EQ(Recognise(folder, OfSensor(Sensor::kMono)).config.dataset.sensor, Sensor::kMono);
 }
 
-TEST(Recording, IsOfOneCameraWhereThatIsAskedFor) {
-  EXPECT_EQ(Recognise(KittiTown(), OfSensor(Sensor::kMono)).config.dataset.sensor, Sensor::kMono);
-}
-
-TEST(Recording, OfKittiWithoutCalibrationIsOneCameraWithAGuess) {
-  const fs::path folder = KittiTown();
-  fs::remove(folder / "calib.txt");
-  const Recording town = Recognise(folder, {});
-  EXPECT_TRUE(town.guessed_lens);
-  EXPECT_EQ(town.config.dataset.sensor, Sensor::kMono);
-  EXPECT_THAT(town.findings[1], HasSubstr("the right camera is not used"));
-  EXPECT_THAT(town.findings[2], HasSubstr("guessed"));
-  EXPECT_NO_THROW(OpenDataset(folder, town.config.dataset));
-  EXPECT_THAT(Refusal(folder, OfSensor(Sensor::kStereo)),
-              HasSubstr("the distance of the two cameras is not known"));
-}
-
-TEST(Recording, OfTumWithDepthIsRgbd) {
-  EXPECT_EQ(Recognise(TumFolder("a", true), {}).config.dataset.sensor, Sensor::kRgbd);
-  EXPECT_EQ(Recognise(TumFolder("a", false), {}).config.dataset.sensor, Sensor::kMono);
+TEST(Recording, OfPairsWithoutACalibrationIsOneCameraWithAGuess) {
+  const fs::path kitti = KittiTown(), pairs = testing::FreshFolder() / "pairs";
+  fs::remove(kitti / "calib.txt");
+  for (const char* camera : {"cam0", "cam1"}) WriteImages(pairs / camera);
+  for (const fs::path& folder : {kitti, pairs}) {
+    const Recording found = Recognise(folder, {});
+    EXPECT_TRUE(found.guessed_lens);
+    EXPECT_EQ(found.config.dataset.sensor, Sensor::kMono);
+    EXPECT_THAT(found.findings[1], HasSubstr("the right camera is not used"));
+    EXPECT_THAT(found.findings[2], HasSubstr("guessed"));
+    EXPECT_EQ(OpenDataset(folder, found.config.dataset)->Size(),
+              folder == pairs ? 3u : std::size_t{testing::kTinyFrames});
+    EXPECT_THAT(Refusal(folder, OfSensor(Sensor::kStereo)),
+                HasSubstr("the distance of the two cameras is not known"));
+  }
 }
 
 TEST(Recording, OfTumsFolderNamesHasThePublishedCamera) {
@@ -131,7 +127,9 @@ TEST(Recording, OfColourAndDepthInOneFolderIsRgbdInTheLayoutsUnit) {
   EXPECT_FLOAT_EQ(dataset->Read(0).frame->depth_m.at<float>(0, 0), 1.5F);
 }
 
-TEST(Recording, OfTumWithoutAKnownUnitOfDepthSaysWhatIsAssumed) {
+TEST(Recording, OfTumWithDepthIsRgbdAndSaysWhichUnitIsAssumed) {
+  EXPECT_EQ(Recognise(TumFolder("a", true), {}).config.dataset.sensor, Sensor::kRgbd);
+  EXPECT_EQ(Recognise(TumFolder("a", false), {}).config.dataset.sensor, Sensor::kMono);
   EXPECT_THAT(Recognise(TumFolder("a", true), {}).findings[1],
               AllOf(HasSubstr("5000 units of depth a metre assumed"), HasSubstr("depth_units_per_m=1000")));
   EXPECT_THAT(Recognise(TumFolder("rgbd_dataset_freiburg1_desk", true), {}).findings[1],
@@ -140,19 +138,6 @@ TEST(Recording, OfTumWithoutAKnownUnitOfDepthSaysWhatIsAssumed) {
   camera.depth_units_per_m = 1000;
   EXPECT_THAT(Recognise(TumFolder("a", true), camera).findings[1],
               HasSubstr("1000 units of depth a metre ("));
-}
-
-TEST(Recording, OfPairsWithoutACalibrationIsOneCameraWithAGuess) {
-  const fs::path folder = testing::FreshFolder();
-  WriteImages(folder / "cam0");
-  WriteImages(folder / "cam1");
-  const Recording pair = Recognise(folder, {});
-  EXPECT_EQ(pair.config.dataset.sensor, Sensor::kMono);
-  EXPECT_TRUE(pair.guessed_lens);
-  EXPECT_THAT(pair.findings[1], HasSubstr("the right camera is not used"));
-  EXPECT_EQ(OpenDataset(folder, pair.config.dataset)->Size(), 3u);
-  EXPECT_THAT(Refusal(folder, OfSensor(Sensor::kStereo)),
-              HasSubstr("the distance of the two cameras is not known"));
 }
 
 TEST(Recording, OfTartanAirIsStereoWithThePublishedCamera) {
@@ -167,10 +152,13 @@ TEST(Recording, OfTartanAirIsStereoWithThePublishedCamera) {
   EXPECT_EQ(OpenDataset(folder, air.config.dataset)->Rig().baseline_m, 0.25);
 }
 
-TEST(Recording, OfImagesTakesTheCalibrationBesideThem) {
+TEST(Recording, OfImagesTakesAFieldOfViewOrTheCalibrationBesideThem) {
   const fs::path folder = testing::FreshFolder();
   WriteImages(folder);
   EXPECT_TRUE(Recognise(folder, {}).guessed_lens);
+  const auto given = Recognise(folder, WithView(90)).config.dataset.camera;
+  EXPECT_NEAR(given->fx, 32, 1e-9);
+  EXPECT_NEAR(given->cx, 31.5, 1e-9);
   std::ofstream(folder / "calibration.yaml")
       << "Camera.fx: 60\nCamera.fy: 60\nCamera.cx: 32\nCamera.cy: 24\n";
   const Recording known = Recognise(folder, {});
@@ -201,14 +189,6 @@ TEST(Recording, TakesTheCameraOfTheCommandLineFirst) {
   EXPECT_EQ(given->distortion, Distortion::kNone);
   EXPECT_EQ(Recognise(town, WithCamera("70,71,30,20,0.1,0.2,0,0")).config.dataset.camera->distortion,
             Distortion::kRadTan);
-}
-
-TEST(Recording, KnowsTheFocalLengthOfAFieldOfView) {
-  const fs::path folder = testing::FreshFolder();
-  WriteImages(folder);
-  const auto given = Recognise(folder, WithView(90)).config.dataset.camera;
-  EXPECT_NEAR(given->fx, 32, 1e-9);
-  EXPECT_NEAR(given->cx, 31.5, 1e-9);
 }
 
 TEST(Recording, OfAStreamIsNotLookedForAmongFiles) {

@@ -21,7 +21,7 @@ pybind11::array_t<double> RowsOf(const pybind11::object& array, const std::strin
 /// x, y, z, qx, qy, qz, qw (and scale), or a matrix of 4 x 4 or 3 x 4, whose 3 x 3 part is a rotation times a
 /// scale. Throws InputError where that is none.
 Similarity SimilarityOf(const pybind11::object& array, const std::string& name);
-/// The same without a scale.
+/// A similarity whose scale is 1. Throws InputError where that is none.
 Pose PoseOf(const pybind11::object& array, const std::string& name);
 /// A square matrix of N x N.
 Eigen::MatrixXd MatrixOf(const pybind11::object& array, const std::string& name, int size);

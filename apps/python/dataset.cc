@@ -127,7 +127,7 @@ class Reader {
     return dataset_->Read(i);
   }
 
-  // Of a growing one; Ctrl-C ends it.
+  // Waits where the data set grows; Ctrl-C ends it.
   bool WaitFor(std::size_t i) const {
     Interrupts interrupts;
     bool there = false;

@@ -89,7 +89,7 @@ void SetSignature(py::handle object) {
   definition->ml_doc = both;
 }
 
-// Of all functions and methods of the module, for inspect.signature, help() and editors: they get the
+// Gives all functions and methods of the module, for inspect.signature, help() and editors, the
 // signature in the form that Python reads.
 void SetSignatures(const py::module_& module) {
   for (const auto& [name, value] : module.attr("__dict__").cast<py::dict>()) {

@@ -18,7 +18,7 @@
 namespace tutti::python {
 namespace {
 
-// As the YAML file would have it, so that the same words refuse it.
+// The value is what the YAML file would have, so that the same words refuse it.
 YAML::Node NodeOf(py::object value) {
   if (py::hasattr(value, "tolist")) value = value.attr("tolist")();  // numpy's
   if (py::hasattr(value, "__fspath__")) value = value.attr("__fspath__")();

@@ -19,7 +19,7 @@ namespace tutti {
 struct EvidenceByte {
   static constexpr int kZero = 101;     ///< stands for ln L = 0: as likely as a new place
   static constexpr double kStep = 0.1;  ///< in ln L
-  /// Of a likelihood; values beyond the range take its nearest end.
+  /// The byte of a likelihood; values beyond the range take its nearest end.
   static std::uint8_t Of(double likelihood);
 };
 
@@ -33,7 +33,7 @@ struct LoggedOpinion {
   std::vector<std::pair<std::int64_t, float>> posterior;
   double weight = 0;        ///< of a member: share of the sum of all that took part, 0..1; 0: it did not
   double at_candidate = 0;  ///< its posterior at the ensemble's best place, 0..1
-  /// Of a member, or of the joint filter, by group of LoggedDetection::group images in the order of the
+  /// What a member, or the joint filter, has by group of LoggedDetection::group images in the order of the
   /// queries: the EvidenceByte of its largest likelihood; images at the end that are no places yet are left
   /// out
   std::vector<std::uint8_t> evidence;
@@ -73,8 +73,8 @@ class DetectionLog : public RunObserver {
 
   /// In the order of the queries.
   const std::vector<LoggedDetection>& detections() const { return detections_; }
-  /// Of the largest submap at the end of the run, in its world: kMostLandmarks at most, spread over all,
-  /// without those that lie far from the others.
+  /// Landmarks of the largest submap at the end of the run, in its world: kMostLandmarks at most, spread over
+  /// all, without those that lie far from the others.
   const std::vector<Eigen::Vector3d>& landmarks() const { return landmarks_; }
 
  private:

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the odometry benchmark (P0), of raw recordings and KITTI-360 (P_rect_00): rectified images.
+// The odometry benchmark (P0), raw recordings and KITTI-360 (P_rect_00) give rectified images.
 Calibration FromKitti(const CalibrationDocument& file) {
   for (const auto& [left, right] :
        {std::pair("P0", "P1"), std::pair("P2", "P3"), std::pair("P_rect_00", "P_rect_01")}) {

@@ -166,7 +166,7 @@ Calibration FromOrbSlam(const CalibrationDocument& file) {
     TakeRawPairs({stella, "K_left", "D_left", "R_left"}, {stella, "K_right", "D_right", "R_right"},
                  stella.Word({"model"}), file.pairs, out);
   }
-  // Of the right camera in the left one's frame.
+  // The pose is that of the right camera in the left one's frame.
   const KeyValue pose = file.Find({"Stereo.T_c1_c2", "Tlr"});
   const CalibrationKeys right = file.At(root, "Camera2.").Or(root, "Camera.");
   if (!file.pairs || out.right || !pose || !file["Camera2.fx"].IsDefined()) return out;

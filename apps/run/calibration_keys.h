@@ -45,8 +45,8 @@ class CalibrationKeys {
   bool IsTrue(KeyNames names) const;
   std::optional<double> Number(KeyNames names) const;
   double Needed(KeyNames names) const;
-  /// Of lists, lists of lists, texts of numbers, and matrices of OpenCV and ROS ({rows, cols, data}), row by
-  /// row.
+  /// Reads lists, lists of lists, texts of numbers, and matrices of OpenCV and ROS ({rows, cols, data}), row
+  /// by row.
   std::vector<double> Numbers(const KeyValue& value) const;
   template <std::size_t kSize>
   std::array<double, kSize> Array(const KeyValue& value) const {
@@ -86,7 +86,7 @@ std::string LensName(const CalibrationKeys& keys);
 /// interest. `note`: what was assumed, for a message.
 PinholeCamera CameraOfKeys(const CalibrationKeys& keys, std::string* note);
 
-/// The same with matrices of these names, for files with two cameras. `lens`: its name.
+/// Reads matrices of these names, in files with two cameras. `lens`: its name.
 PinholeCamera CameraOfMatrices(const CalibrationKeys& keys, const char* matrix, const char* coefficients,
                                const std::string& lens, std::string* note);
 

@@ -241,7 +241,7 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
   return pass;
 }
 
-// Of a residual, which would be 1 if sigmas were as they are said to be.
+// The variance of a residual would be 1 if sigmas were what they are said to be.
 double VarianceOf(const Scene& scene, const Fit& fit) {
   const auto free = static_cast<double>(6 * scene.cameras.size() + 3 * scene.landmarks.size());
   return std::max(1e-4, 2 * fit.cost / std::max(1.0, fit.residuals - free));

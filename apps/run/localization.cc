@@ -140,7 +140,6 @@ TrajectoryPlot Picture(const LocalizationRequest& request, const RunState& state
   return plot;
 }
 
-// Of the map that is located in.
 RunState StateIn(const SlamSystem& slam, const Localization& l) {
   RunState state = {slam.odometry(), slam.loops()};
   state.sessions.clear();

@@ -207,7 +207,7 @@ double FocalLengthCpuSeconds(const RunResult& r) {
   return seconds;
 }
 
-// As --camera takes it, of the images as they are stored; empty: what the run had is as good.
+// What --camera takes, for the images as they are stored; empty: what the run had is as good.
 std::string BetterCamera(const RunResult& r) {
   constexpr double kSame = 0.005, kSurer = 0.7;
   if (!r.focal_length || !r.focal_length_of_map || !r.focal_length_of_map->measured) return "";

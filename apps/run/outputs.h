@@ -42,9 +42,10 @@ class FramePlaces {
  public:
   FramePlaces(const RunResult& result, const Similarity& alignment);
 
-  /// Of the run's own frame with this stamp [s]; nothing if trajectory.txt has no pose for it.
+  /// Where the run's own frame with this stamp [s] is; nothing if trajectory.txt has no pose for it.
   std::optional<Eigen::Vector3d> At(double stamp_s) const;
-  /// Of an end of a loop: the frame has its number in the map (LoopRecord), and a stamp of its recording.
+  /// Where an end of a loop is: the frame has its number in the map (LoopRecord), and a stamp of its
+  /// recording.
   std::optional<Eigen::Vector3d> AtEnd(std::int64_t frame, double stamp_s) const;
 
  private:

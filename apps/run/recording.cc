@@ -158,7 +158,7 @@ class Recogniser {
     return fs::exists(dataset_ / name, ignored);
   }
 
-  // Of tutti generate, or somebody's own; other programs have files of that name, too.
+  // `tutti generate` writes one, and a user may have; other programs have files of that name, too.
   bool HasConfiguration() const {
     std::error_code ignored;
     if (!fs::is_regular_file(dataset_ / kConfiguration, ignored)) return false;

@@ -42,8 +42,8 @@ void CollectMap(const RunState& state, RunResult& result);
 /// Keyframes of the recordings that the map held before, by result.map->sessions, for pictures.
 void CollectEarlierSessions(const RunState& state, RunResult& result);
 
-/// Of loops to earlier sessions of the same data set (MapSession::note, as NoteOf has written it): the time
-/// stamp of the candidate, which has a frame in it.
+/// Sets the candidate's time stamp of loops to earlier sessions of the same data set (MapSession::note, as
+/// NoteOf has written it): a frame there has it.
 void CollectStamps(const RunState& state, RunResult& result);
 
 /// How far apart the two ends of each loop are, by trajectory.txt: fills result.loop_errors. EvaluateRun goes

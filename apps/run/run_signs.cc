@@ -49,7 +49,7 @@ Value FewInliers(const RunResult& r) {
   return Share(static_cast<double>(few), static_cast<double>(r.frame_inliers.size()));
 }
 
-// Of the keyframes' landmarks; 0: not known.
+// The median depth of the keyframes' landmarks; 0: not known.
 double SceneDepth(const RunResult& r) {
   std::vector<double> depths;
   for (const auto& [frame, depth] : r.map_figures.depth) depths.push_back(depth);

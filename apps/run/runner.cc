@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// As somebody in another folder has to write it.
+// The path that leads there from any folder.
 std::string Absolute(const fs::path& path) {
   if (IsCamera(path.string()) || path.string() == "none") return path.string();
   return fs::absolute(path).lexically_normal().string();

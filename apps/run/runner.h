@@ -58,7 +58,7 @@ struct RunRequest {
 /// does an exception (of an observer, for example), which is thrown on afterwards.
 RunResult RunSlam(const RunRequest& request);
 
-/// The same from a configuration in memory; `request.config` is only a name then.
+/// Runs with a configuration in memory; `request.config` is only a name then.
 RunResult RunSlam(const RunRequest& request, const RunConfig& config);
 
 /// A run that was broken off, as its checkpoint has it.

@@ -162,7 +162,7 @@ class LiveState : public RunObserver {
   int steps_ = 0;
   bool closed_ = false;
   double last_viewer_s_ = 0;
-  // Of the tracking thread alone.
+  // What follows belongs to the tracking thread alone.
   bool begun_ = false, joined_ = false;
   std::size_t loops_seen_ = 0, accepted_seen_ = 0;
   int corrections_seen_ = 0;

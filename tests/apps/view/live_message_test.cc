@@ -31,7 +31,7 @@ TEST(LiveMessage, TracksAreInPixelsOfThePictureThatIsSent) {
   LiveTrail trail;
   ExtendTrail({{4, {100, 60}}}, &trail);
   ExtendTrail({{4, {110, 64}}}, &trail);
-  // As it is, and twice as wide as what is sent.
+  // The images are as wide as what is sent, and twice as wide.
   EXPECT_EQ(Message(NewsOf(320, trail))["frame"]["tracks"],
             nlohmann::json::parse("[[110.0, 64.0, 100.0, 60.0]]"));
   EXPECT_EQ(Message(NewsOf(1280, trail))["frame"]["tracks"],

@@ -21,9 +21,9 @@ void FrameClock::WaitUntil(double now) {
 
 void Playback::Reach(double stamp_s) {
   if (offset_s_) {
-    clock_.WaitUntil(stamp_s + *offset_s_);
+    clock_->WaitUntil(stamp_s + *offset_s_);
   } else {
-    offset_s_ = clock_.Now() - stamp_s;
+    offset_s_ = clock_->Now() - stamp_s;
   }
 }
 

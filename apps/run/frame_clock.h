@@ -3,8 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tutti {
@@ -21,14 +23,14 @@ class FrameClock {
 /// the distance of their stamps from the first one's.
 class Playback {
  public:
-  explicit Playback(FrameClock& clock) : clock_(clock) {}
+  explicit Playback(std::shared_ptr<FrameClock> clock) : clock_(std::move(clock)) {}
   /// Waits until the frame of this stamp [s] is due.
   void Reach(double stamp_s);
   /// True if it is due already; false before the first Reach().
-  bool Due(double stamp_s) { return offset_s_ && clock_.Now() >= stamp_s + *offset_s_; }
+  bool Due(double stamp_s) { return offset_s_ && clock_->Now() >= stamp_s + *offset_s_; }
 
  private:
-  FrameClock& clock_;
+  std::shared_ptr<FrameClock> clock_;
   std::optional<double> offset_s_;  // clock minus stamp
 };
 

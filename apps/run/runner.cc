@@ -143,7 +143,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
       internal::Say("warning: the calibration can't be right: %s; %s", f.measured.c_str(), f.advice.c_str());
     }
   }
-  SlamRun run(request, result.config, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);
+  SlamRun run(request, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);
   Attempts attempts;
   attempts.Try([&] { run.TrackAll(); });
   attempts.Try([&] { run.Count(); });

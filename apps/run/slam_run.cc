@@ -37,29 +37,20 @@ void State(Archive& archive, FoundFrame& found) {
   archive(found.index, found.stamp_s, found.by_loop);
 }
 
-// What a result has already while the run goes on.
-template <class Archive>
-void StateOfGrowing(Archive& archive, RunResult& result) {
-  archive(result.frames_lost, result.frames_without_mask, result.frames_without_depth, result.bad,
-          result.bad_depth, result.lost, result.found, result.frame_ms, result.latency_ms,
-          result.frame_inliers, result.frames_by_grey_values);
-}
-
-SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Dataset& dataset,
-                 const GivenOdometry* given, const std::filesystem::path& out, RunResult& result)
+SlamRun::SlamRun(const RunRequest& request, const Dataset& dataset, const GivenOdometry* given,
+                 const std::filesystem::path& out, RunResult& result)
     : request_(request),
-      config_(config),
       dataset_(dataset),
       given_(given),
       result_(result),
-      planted_(config.run, config.loops.seed),
-      live_(out, dataset.Rig(), config) {
+      planted_(result.config.run, result.config.loops.seed),
+      live_(out, dataset.Rig(), result.config) {
   if (request.resume) {
     Resume(*request.resume);
   } else if (request.map) {
     GoOnIn(*request.map);
   } else {
-    slam_ = std::make_unique<SlamSystem>(Watched(config, request), dataset.Rig(), Recorder());
+    slam_ = std::make_unique<SlamSystem>(Watched(result.config, request), dataset.Rig(), Recorder());
   }
   for (const MapSession& session : slam_->Sessions()) session_offsets_.push_back(session.frame_offset);
   if (request.checkpoint_s) checkpoints_.emplace(out / kCheckpoint, *request.checkpoint_s);
@@ -79,8 +70,7 @@ SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Datas
   result_.endless = dataset.FrameSupply() != Supply::kStored;
   result_.realtime = request.realtime;
   if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
-  clock_ = request.clock ? request.clock : std::make_shared<FrameClock>();
-  playback_.emplace(*clock_);
+  playback_.emplace(request.clock ? request.clock : std::make_shared<FrameClock>());
 }
 
 void SlamRun::TrackAll() {
@@ -89,7 +79,7 @@ void SlamRun::TrackAll() {
   begin_ = Span::Clock::now();
   watch_ = internal::Stopwatch();
   cpu_begin_ = ProcessCpuSeconds();
-  Progress progress(config_.run.loops ? "slam" : "odometry", frames, Out());
+  Progress progress(result_.config.run.loops ? "slam" : "odometry", frames, Out());
   Prefetcher reader(dataset_, Reading());
   const double waited_ms = so_far_.read_wait_ms;
   while (!InterruptGuard::Requested()) {
@@ -101,7 +91,7 @@ void SlamRun::TrackAll() {
     TakeFrame(*fetched, progress);
     NoteWarnings(progress);
     std::string status = so_far_.state;
-    if (config_.run.loops)
+    if (result_.config.run.loops)
       status += "  loops " + std::to_string(CountAccepted(slam_->loops())) + "/" +
                 std::to_string(slam_->loops().size());
     progress.Update(++so_far_.next, status);
@@ -217,7 +207,7 @@ PrefetchOptions SlamRun::Reading() {
   PrefetchOptions options;
   options.begin = so_far_.next;
   options.end = total_;
-  options.ahead = config_.run.threads > 1 ? 4 : 0;
+  options.ahead = result_.config.run.threads > 1 ? 4 : 0;
   options.stop = &InterruptGuard::Requested;
   options.recorder = Recorder();
   // Features need nothing from before, so they are extracted ahead of the tracking, too.
@@ -290,7 +280,8 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
     const auto pause = pauses_.Next(fetched.read.frame->index, fetched.read.frame->stamp_s);
     if (pause) progress.Note("tutti: warning: " + *pause, "frames come long after the one before them");
     CountDepth(fetched.read, progress);
-    if (!config_.dataset.mask.empty() && fetched.read.frame->mask.empty()) ++result_.frames_without_mask;
+    if (!result_.config.dataset.mask.empty() && fetched.read.frame->mask.empty())
+      ++result_.frames_without_mask;
     TrackOne(*fetched.read.frame);
     result_.latency_ms.push_back(fetched.prepare_ms + result_.frame_ms.back());
     if (alone_ && TracksAlong()) alone_->Track(*fetched.read.frame);
@@ -352,7 +343,9 @@ void SlamRun::State(Archive& archive) {
     }
   }
   archive(so_far_, planted_, live, alone_last, has_alone, collected);
-  StateOfGrowing(archive, result_);
+  archive(result_.frames_lost, result_.frames_without_mask, result_.frames_without_depth, result_.bad,
+          result_.bad_depth, result_.lost, result_.found, result_.frame_ms, result_.latency_ms,
+          result_.frame_inliers, result_.frames_by_grey_values);
   if constexpr (Archive::kReading) {
     if (has_alone) resumed_alone_ = alone_last;
     resumed_live_ = std::move(live);
@@ -393,11 +386,11 @@ void SlamRun::GoOnIn(const std::filesystem::path& map) {
     throw InputError(
         map.string() +
         ": a recording can only go on in a map with poses, which needs calibrated cameras on both sides");
-  if (!info.config.run.loops || !config_.run.loops)
+  if (!info.config.run.loops || !result_.config.run.loops)
     throw InputError(map.string() +
                      ": without loop closure (run.loops, --no-loops) nothing would connect a recording with "
                      "the map; both need it");
-  info.config = Watched(config_, request_);
+  info.config = Watched(result_.config, request_);
   slam_ = SlamSystem::Load(map, info, Recorder());
   try {
     slam_->BeginSession(result_.rig);
@@ -417,11 +410,11 @@ void SlamRun::Resume(const std::filesystem::path& checkpoint) {
   MapInfo info = ReadMapInfo(checkpoint);
   if (StateOf(info.rig) != StateOf(result_.rig))
     throw InputError(checkpoint.string() + ": is of another camera than the data set has by now");
-  info.config = Watched(config_, request_);
+  info.config = Watched(result_.config, request_);
   slam_ = SlamSystem::Load(checkpoint, info, Recorder(), [this](internal::SectionReader& file) {
     ReadState(file, kRunSection, this);
     if (!resumed_alone_) return;
-    Odometry alone(config_.odometry, result_.rig);
+    Odometry alone(result_.config.odometry, result_.rig);
     alone.LoadSections(&file);
     alone_ = std::make_unique<OdometryAlone>(alone, *resumed_alone_, AloneBeside());
   });

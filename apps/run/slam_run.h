@@ -72,12 +72,12 @@ class PlantedLoops {
 };
 
 /// Tracks the frames of a data set and collects what it found. In order: TrackAll, Count, TrackUntouched,
-/// Collect; after TrackAll threw, too. What it is given must outlive it.
+/// Collect; after TrackAll threw, too. `result` has the configuration. What it is given must outlive it.
 class SlamRun {
  public:
   /// `given`: the odometry that is followed; null: there is none.
-  SlamRun(const RunRequest& request, const RunConfig& config, const Dataset& dataset,
-          const GivenOdometry* given, const std::filesystem::path& out, RunResult& result);
+  SlamRun(const RunRequest& request, const Dataset& dataset, const GivenOdometry* given,
+          const std::filesystem::path& out, RunResult& result);
 
   void TrackAll();
   /// What TrackAll went through, also if something broke it off.
@@ -108,9 +108,11 @@ class SlamRun {
   void AwaitFrame(Prefetcher& frames);
   // The odometry alone tracks beside the run, or in real time, where nothing may hold the tracking up, after
   // it.
-  bool TracksTwice() const { return config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce; }
+  bool TracksTwice() const {
+    return result_.config.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
+  }
   bool TracksAlong() const { return TracksTwice() && !request_.realtime; }
-  bool AloneBeside() const { return TracksAlong() && config_.run.threads > 1; }
+  bool AloneBeside() const { return TracksAlong() && result_.config.run.threads > 1; }
   // After a run in real time. False if it was interrupted.
   bool TrackAgain(std::size_t begin, std::size_t end);
   void CountDepth(const ReadResult& read, Progress& progress);
@@ -131,7 +133,6 @@ class SlamRun {
   void TrackOne(const InputFrame& frame);
 
   const RunRequest& request_;
-  const RunConfig& config_;
   const Dataset& dataset_;
   const GivenOdometry* given_;
   std::vector<std::int64_t> session_offsets_;  // MapSession::frame_offset of all
@@ -150,7 +151,6 @@ class SlamRun {
   Trajectory resumed_live_;                    // on its way into live_
   std::unique_ptr<OdometryAlone> alone_;       // from before the detector first changed anything
   std::optional<std::int64_t> resumed_alone_;  // its last frame, on the way into alone_
-  std::shared_ptr<FrameClock> clock_;          // of playback_
   std::optional<Playback> playback_;           // in real time, unless the source keeps time itself
   std::size_t total_ = 0;                      // most frames; endless for a growing data set
   std::optional<Checkpointer> checkpoints_;

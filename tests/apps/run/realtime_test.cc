@@ -26,8 +26,7 @@ class SlowMachineClock : public FrameClock {
 };
 
 TEST(Playback, FramesAreDueByTheDistanceOfTheirStamps) {
-  SlowMachineClock clock(0);
-  Playback playback(clock);
+  Playback playback(std::make_shared<SlowMachineClock>(0));
   EXPECT_FALSE(playback.Due(5.0));  // nothing is due before the play
   playback.Reach(5.0);
   EXPECT_TRUE(playback.Due(5.0));

@@ -82,9 +82,4 @@ Json PosteriorJson(const RunResult& result, const DetectionLog& log, const std::
 /// Pictures of some of each outcome: {"note", "entries": [{"outcome", "title", "text", "picture"}]}.
 Json GalleryJson(const RunResult& result, const std::vector<ShownLoop>& loops);
 
-/// Stages, frame times, processor time, memory.
-Json TimingJson(const RunResult& result);
-/// Sections of the configuration, and what the program was built with.
-Json ConfigurationJson(const RunResult& result);
-
 }  // namespace tutti::report

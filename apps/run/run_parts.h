@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/run/runner.h"
+#include "tutti/backend/evaluation.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti {
@@ -45,6 +46,9 @@ void CollectEarlierSessions(const RunState& state, RunResult& result);
 /// Sets the candidate's time stamp of loops to earlier sessions of the same data set (MapSession::note, as
 /// NoteOf has written it): a frame there has it.
 void CollectStamps(const RunState& state, RunResult& result);
+
+/// How trajectories of a run are evaluated: aligned by Sim(3) or SE(3), time stamps within 0.01 s.
+EvaluationOptions EvaluationWith(bool scale);
 
 /// How far apart the two ends of each loop are, by trajectory.txt: fills result.loop_errors. EvaluateRun goes
 /// over them again with the ground truth.

@@ -3,9 +3,7 @@
 
 #include <pybind11/stl.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -15,7 +15,6 @@
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
 #include "apps/python/pickled.h"
-#include "tutti/core/error.h"
 
 namespace tutti::python {
 namespace {

@@ -1,13 +1,10 @@
 // The parts of a run's report.
 #pragma once
 
-#include <Eigen/Core>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "apps/report/page.h"

@@ -1,7 +1,6 @@
 #include "apps/report/run_report.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "apps/report/report_parts.h"
 #include "apps/run/outputs.h"

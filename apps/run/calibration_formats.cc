@@ -5,7 +5,6 @@
 #include <tuple>
 
 #include "apps/run/calibration_keys.h"
-#include "core/camera_text.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

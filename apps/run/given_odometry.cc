@@ -12,7 +12,6 @@
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
-#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {

@@ -9,7 +9,6 @@
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/backend/g2o_io.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {

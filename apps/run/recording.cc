@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 
 #include "apps/run/calibration_file.h"
 #include "core/camera_text.h"

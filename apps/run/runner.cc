@@ -1,6 +1,5 @@
 #include "apps/run/runner.h"
 
-#include <cstdio>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,6 @@
 #include "apps/run/shared_odometry.h"
 
 #include <opencv2/core.hpp>
-#include <utility>
 
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"

@@ -15,7 +15,6 @@
 #include "tests/support/recording.h"
 #include "tests/support/small_room.h"
 #include "tests/support/test_data.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {

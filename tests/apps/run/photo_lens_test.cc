@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
-#include <utility>
 #include <vector>
 
 #include "apps/run/recording.h"

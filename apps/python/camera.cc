@@ -6,10 +6,9 @@
 #include <map>
 #include <string>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
-#include "apps/python/options.h"
 #include "apps/python/pickled.h"
-#include "apps/python/poses.h"
 #include "tutti/core/error.h"
 
 namespace tutti::python {

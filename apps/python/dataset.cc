@@ -8,13 +8,10 @@
 #include <string>
 #include <utility>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/images.h"
-#include "apps/python/interrupts.h"
-#include "apps/python/options.h"
 #include "apps/python/pickled.h"
-#include "apps/python/poses.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/features.h"
 
@@ -130,7 +127,7 @@ class Reader {
     return dataset_->Read(i);
   }
 
-  // Of a growing one; Ctrl-C ends it.
+  // Waits where the data set grows; Ctrl-C ends it.
   bool WaitFor(std::size_t i) const {
     Interrupts interrupts;
     bool there = false;
@@ -158,10 +155,9 @@ void BindFrame(py::module_& module) {
       .def(py::init(&MakeFrame), "image"_a, "stamp"_a, "index"_a = 0, py::kw_only(), "right"_a = py::none(),
            "depth"_a = py::none(), "mask"_a = py::none(), "rgb"_a = false,
            "From arrays, which are copied; colour becomes grey. Rectified: the rig's camera has no "
-           "distortion. image, "
-           "right: uint8 (H, W) or (H, W, 3), blue, green, red unless rgb. depth: float32 (H, W) [m], 0 = "
-           "unknown. mask: uint8 or bool (H, W); there are no features where it is 0. "
-           "index grows.")
+           "distortion. image, right: uint8 (H, W) or (H, W, 3), blue, green, red unless rgb. depth: float32 "
+           "(H, W) [m], 0 = unknown. mask: uint8 or bool (H, W); there are no features where it is 0. index "
+           "grows.")
       .def_readonly("index", &InputFrame::index, doc::InputFrame_index)
       .def_readonly("stamp", &InputFrame::stamp_s, doc::InputFrame_stamp_s)
       .def_property_readonly(
@@ -226,9 +222,9 @@ void BindDataset(py::module_& module) {
       .def("__next__", [](FrameIterator& self) { return self.reader->Next(self.place); });
   const std::string text =
       std::string("for frame in Dataset(path): ...\n\n") + doc::Dataset + "\n\n" + doc::OpenDataset +
-      "\n\nThe iterator leaves out frames that can't be read, with a warning that names the file; "
-      "dataset[i] raises tutti.FileError for them.\n\ncamera: tutti.Camera or a dict of its "
-      "keywords; config: tutti.Config, whose sections dataset and camera are used. Keywords:\n" +
+      "\n\nThe iterator leaves out frames that can't be read, with a warning that names the file; dataset[i] "
+      "raises tutti.FileError for them.\n\ncamera: tutti.Camera or a dict of its keywords; config: "
+      "tutti.Config, whose sections dataset and camera are used. Keywords:\n" +
       DescribeOptions("dataset");
   py::class_<Reader>(module, "Dataset", text.c_str())
       .def(py::init<const fs::path&, const std::optional<RunConfig>&, const py::object&, const py::kwargs&>(),
@@ -246,8 +242,7 @@ void BindDataset(py::module_& module) {
            (std::string("uint8 (H, W, 3), blue, green, red. ") + doc::Dataset_ReadColour).c_str())
       .def("ground_truth", &GroundTruth, "file"_a = py::none(),
            (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw; T_world_body. file: None for that "
-                        "in its usual "
-                        "place in the folder. ") +
+                        "in its usual place in the folder. ") +
             "Poses of KITTI get the data set's stamps, and must be as many. A time stamp that stands there "
             "twice keeps its first pose, with a warning. Raises tutti.InputError with file and line.")
                .c_str())

@@ -28,7 +28,7 @@ auto Reading(const std::filesystem::path& path, Work work) {
   }
 }
 
-/// The same of what `work` writes: each InputError is one of the file.
+/// Runs `work`, which writes a file: each InputError is one of the file.
 template <class Work>
 void Writing(Work work) {
   try {

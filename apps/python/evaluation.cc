@@ -3,15 +3,13 @@
 
 #include <pybind11/stl.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/poses.h"
 #include "apps/tutti/evaluation_report.h"
 
 namespace tutti::python {
@@ -48,8 +46,21 @@ cli::NamedPoses NamedPosesOf(const py::object& object, const std::string& name,
 }
 
 py::dict Evaluate(const py::object& reference, const py::object& estimate, const std::string& alignment,
-                  const std::vector<double>& times, const EvaluationOptions& given, bool errors) {
-  EvaluationOptions options = given;
+                  const std::vector<double>& times, double max_time_difference_s, double time_offset_s,
+                  bool interpolate, double max_interpolation_s, std::size_t align_first,
+                  const std::array<double, 3>& vertical, double rpe_delta, const std::string& rpe_unit,
+                  bool rpe_all_pairs, double rpe_tolerance, bool errors) {
+  EvaluationOptions options;
+  options.max_time_difference_s = max_time_difference_s;
+  options.time_offset_s = time_offset_s;
+  options.interpolate = interpolate;
+  options.max_interpolation_s = max_interpolation_s;
+  options.align_first = align_first;
+  options.vertical = Eigen::Vector3d(vertical[0], vertical[1], vertical[2]);
+  options.rpe_delta = rpe_delta;
+  options.rpe_unit = ParseDeltaUnit(rpe_unit);
+  options.rpe_all_pairs = rpe_all_pairs;
+  options.rpe_tolerance = rpe_tolerance;
   options.alignment = ParseTrajectoryAlignment(alignment);
   cli::NamedPoses of_reference = NamedPosesOf(reference, "reference", times);
   cli::NamedPoses of_estimate = NamedPosesOf(estimate, "estimate", times);
@@ -73,37 +84,15 @@ py::dict Evaluate(const py::object& reference, const py::object& estimate, const
   return result;
 }
 
-EvaluationOptions EvaluationOptionsOf(double max_time_difference_s, double time_offset_s, bool interpolate,
-                                      double max_interpolation_s, std::size_t align_first,
-                                      const std::array<double, 3>& vertical, double rpe_delta,
-                                      const std::string& rpe_unit, bool rpe_all_pairs, double rpe_tolerance) {
-  EvaluationOptions options;
-  options.max_time_difference_s = max_time_difference_s;
-  options.time_offset_s = time_offset_s;
-  options.interpolate = interpolate;
-  options.max_interpolation_s = max_interpolation_s;
-  options.align_first = align_first;
-  options.vertical = Eigen::Vector3d(vertical[0], vertical[1], vertical[2]);
-  options.rpe_delta = rpe_delta;
-  options.rpe_unit = ParseDeltaUnit(rpe_unit);
-  options.rpe_all_pairs = rpe_all_pairs;
-  options.rpe_tolerance = rpe_tolerance;
-  return options;
-}
-
 std::string DescribeEvaluation() {
   const auto line = [](const char* name, const char* text) { return std::string(name) + ": " + text + "\n"; };
   return std::string(
              "The errors of an estimate against a reference, with the conventions and numbers of evo: a dict "
-             "of "
-             "plain numbers, texts and lists, with the keys of `tutti evaluate --json` (docs/evaluation.md), "
-             "and "
-             "unless errors=False a dict \"errors\" of lists, one number for each pair: stamp [s], "
-             "translation "
-             "[m], rotation_deg. pandas.json_normalize makes a row of it.\n\n"
+             "of plain numbers, texts and lists, with the keys of `tutti evaluate --json` "
+             "(docs/evaluation.md), and unless errors=False a dict \"errors\" of lists, one number for each "
+             "pair: stamp [s], translation [m], rotation_deg. pandas.json_normalize makes a row of it.\n\n"
              "reference, estimate: a file (tum, kitti, euroc, g2o) or an array (N, 8): stamp [s], x, y, z "
-             "[m], qx, "
-             "qy, qz, qw.\nalignment: none, origin, se3, sim3 (one camera), scale or yaw.\n"
+             "[m], qx, qy, qz, qw.\nalignment: none, origin, se3, sim3 (one camera), scale or yaw.\n"
              "times: time stamps of files that have none (kitti, g2o).\n") +
          line("max_time_difference_s", doc::EvaluationOptions_max_time_difference_s) +
          line("time_offset_s", doc::EvaluationOptions_time_offset_s) +
@@ -123,20 +112,8 @@ void BindEvaluation(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   const EvaluationOptions d;
   module.def(
-      "evaluate",
-      [](const py::object& reference, const py::object& estimate, const std::string& alignment,
-         const std::vector<double>& times, double max_time_difference_s, double time_offset_s,
-         bool interpolate, double max_interpolation_s, std::size_t align_first,
-         const std::array<double, 3>& vertical, double rpe_delta, const std::string& rpe_unit,
-         bool rpe_all_pairs, double rpe_tolerance, bool errors) {
-        return Evaluate(
-            reference, estimate, alignment, times,
-            EvaluationOptionsOf(max_time_difference_s, time_offset_s, interpolate, max_interpolation_s,
-                                align_first, vertical, rpe_delta, rpe_unit, rpe_all_pairs, rpe_tolerance),
-            errors);
-      },
-      "reference"_a, "estimate"_a, "alignment"_a = ToString(d.alignment), py::kw_only(),
-      "times"_a = std::vector<double>(), "max_time_difference_s"_a = d.max_time_difference_s,
+      "evaluate", &Evaluate, "reference"_a, "estimate"_a, "alignment"_a = ToString(d.alignment),
+      py::kw_only(), "times"_a = std::vector<double>(), "max_time_difference_s"_a = d.max_time_difference_s,
       "time_offset_s"_a = d.time_offset_s, "interpolate"_a = d.interpolate,
       "max_interpolation_s"_a = d.max_interpolation_s, "align_first"_a = d.align_first,
       "vertical"_a = std::array<double, 3>{d.vertical.x(), d.vertical.y(), d.vertical.z()},

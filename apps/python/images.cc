@@ -1,4 +1,4 @@
-#include "apps/python/images.h"
+#include "apps/python/arrays.h"
 
 #include <opencv2/imgproc.hpp>
 #include <string>

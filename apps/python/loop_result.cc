@@ -3,9 +3,9 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/pickled.h"
-#include "apps/python/poses.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::python {
@@ -162,10 +162,9 @@ void BindLoopResult(py::module_& module) {
       .def_readonly("verification", &LoopResult::verification, doc::LoopResult_verification)
       .def_readonly("tried", &LoopResult::tried, doc::LoopResult_tried)
       .def_readonly("late", &LoopResult::late, doc::LoopResult_late)
-      .def_property_readonly(
-          "locations", Locations<LoopResult>(&LoopResult::posterior_by_location),
-          "(N,) int64: ids of the places that `posteriors` is about; only with keep_posterior or "
-          "keep_evidence.")
+      .def_property_readonly("locations", Locations<LoopResult>(&LoopResult::posterior_by_location),
+                             "(N,) int64: ids of the places that `posteriors` is about; only with "
+                             "keep_posterior or keep_evidence.")
       .def_property_readonly("posteriors", Posteriors<LoopResult>(&LoopResult::posterior_by_location),
                              (std::string("(N,) float64, 0..1, parallel to `locations`. ") +
                               doc::LoopResult_posterior_by_location)

@@ -1,11 +1,16 @@
-#include "apps/python/options.h"
+// Options as keywords, and tutti.Config: what a YAML file of `tutti run --config` says.
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "apps/python/bindings.h"
+#include "apps/python/errors.h"
+#include "apps/python/pickled.h"
 #include "apps/slam/config_table.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -13,7 +18,7 @@
 namespace tutti::python {
 namespace {
 
-// As the YAML file would have it, so that the same words refuse it.
+// The value is what the YAML file would have, so that the same words refuse it.
 YAML::Node NodeOf(py::object value) {
   if (py::hasattr(value, "tolist")) value = value.attr("tolist")();  // numpy's
   if (py::hasattr(value, "__fspath__")) value = value.attr("__fspath__")();
@@ -140,6 +145,37 @@ std::string DescribeOptions(const std::string& section, RunConfig defaults) {
     text.append(InPython(key.doc)).append("\n");
   }
   return text;
+}
+
+namespace {
+
+RunConfig ConfigOf(const std::optional<std::filesystem::path>& file, const py::kwargs& sections) {
+  RunConfig config;
+  if (file) config = Reading(*file, [&] { return LoadConfig(*file); });
+  SetOptions("Config", "", sections, config);
+  return config;
+}
+
+}  // namespace
+
+void BindConfig(py::module_& module) {
+  py::class_<RunConfig>(
+      module, "Config",
+      "Everything that a run can be told, as in the YAML files: sections dataset, camera, odometry, loops, "
+      "graph, run.\n\nConfig(\"tum.yaml\", run={\"threads\": 1}): each section is a keyword and a dict; what "
+      "it says wins over the file. `tutti run --help-config` and describe(section) explain the keys. Raises "
+      "tutti.InputError that names file and line.")
+      .def(py::init(&ConfigOf), py::arg("file") = py::none())
+      .def(Pickled<RunConfig>())
+      .def("options", &OptionsOf, py::arg("section"), "The present values of a section.");
+  module.def(
+      "describe", [](const std::string& section) { return DescribeOptions(section); }, py::arg("section"),
+      "What the keys of a section of the configuration do: its options, defaults, units and ranges. The "
+      "keywords of LoopDetector are those of section \"loops\", of Camera \"camera\", of PoseGraph.optimize "
+      "\"graph\".");
+  module.def(
+      "default_options", [](const std::string& section) { return OptionsOf(RunConfig(), section); },
+      py::arg("section"), "The values that a section of the configuration has where nothing else is said.");
 }
 
 }  // namespace tutti::python

@@ -1,6 +1,7 @@
-// tutti.PoseGraph
+// tutti.PoseGraph, OptimizationReport and Certificate
 #include "tutti/backend/pose_graph.h"
 
+#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -10,13 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/guarded.h"
-#include "apps/python/interrupts.h"
-#include "apps/python/optimization_report.h"
-#include "apps/python/options.h"
-#include "apps/python/poses.h"
+#include "apps/python/pickled.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -28,6 +26,32 @@ namespace {
 namespace fs = std::filesystem;
 
 using Graph = Guarded<PoseGraph>;
+
+// An array of take(0), take(1), ...
+template <class T, class Take>
+py::array_t<T> Column(std::size_t size, Take take) {
+  py::array_t<T> array(static_cast<py::ssize_t>(size));
+  T* values = array.mutable_data();
+  for (std::size_t i = 0; i < size; ++i) values[i] = take(i);
+  return array;
+}
+
+// One number of each edge.
+template <class T>
+auto OfEdges(T EdgeOutcome::*field) {
+  return [field](const PoseGraphReport& report) {
+    return Column<T>(report.edges.size(), [&](std::size_t e) { return report.edges[e].*field; });
+  };
+}
+
+// "chi2", "chi2log", "chordal".
+py::dict CostsOf(const GraphCosts& costs) {
+  py::dict all;
+  all["chi2"] = costs.chi2;
+  all["chi2log"] = costs.chi2log;
+  all["chordal"] = costs.chordal;
+  return all;
+}
 
 GraphKind KindOf(const std::string& word) {
   if (word == "se2") return GraphKind::kSE2;
@@ -65,14 +89,14 @@ Matrix7d InformationOf(const py::object& information, GraphKind kind) {
 }
 
 void AddPose(Graph& self, NodeId id, const py::object& pose, bool fixed) {
-  const GraphKind kind = self.Run([](PoseGraph& graph) { return graph.kind(); });
+  const GraphKind kind = Locked(&PoseGraph::kind)(self);
   const Similarity S_world_node = NodePose(pose, kind, "pose of node " + std::to_string(id));
   self.Run([&](PoseGraph& graph) { graph.AddNode(id, S_world_node, fixed); });
 }
 
 void AddEdge(Graph& self, NodeId from, NodeId to, const py::object& pose, const py::object& information,
              const std::optional<std::vector<double>>& sigmas, std::optional<bool> loop) {
-  const GraphKind kind = self.Run([](PoseGraph& graph) { return graph.kind(); });
+  const GraphKind kind = Locked(&PoseGraph::kind)(self);
   PoseGraphEdge edge;
   edge.from = from;
   edge.to = to;
@@ -109,7 +133,7 @@ std::unique_ptr<Graph> ReadGraph(const fs::path& file, const std::string& bad_in
 }
 
 py::array_t<double> NodePoses(Graph& self) {
-  const auto nodes = self.Run([](PoseGraph& graph) { return graph.nodes(); });
+  const auto nodes = Locked(&PoseGraph::nodes)(self);
   std::vector<Pose> poses;
   poses.reserve(nodes.size());
   for (const PoseGraphNode& node : nodes) poses.push_back(node.pose.RigidPart());
@@ -117,12 +141,12 @@ py::array_t<double> NodePoses(Graph& self) {
 }
 
 py::array LandmarkIds(Graph& self) {
-  const auto landmarks = self.Run([](PoseGraph& graph) { return graph.landmarks(); });
+  const auto landmarks = Locked(&PoseGraph::landmarks)(self);
   return Column<NodeId>(landmarks.size(), [&](std::size_t k) { return landmarks[k].id; });
 }
 
 py::array_t<double> LandmarkPositions(Graph& self) {
-  const auto landmarks = self.Run([](PoseGraph& graph) { return graph.landmarks(); });
+  const auto landmarks = Locked(&PoseGraph::landmarks)(self);
   py::array_t<double> out({landmarks.size(), std::size_t{3}});
   auto rows = out.mutable_unchecked<2>();
   for (std::size_t k = 0; k < landmarks.size(); ++k) {
@@ -173,31 +197,74 @@ Certificate Certify(Graph& self, double certified_gap, double max_shift) {
 
 }  // namespace
 
+void BindOptimizationReport(py::module_& module) {
+  using Report = PoseGraphReport;
+  py::class_<Report>(module, "OptimizationReport",
+                     "What PoseGraph.optimize did. Arrays are parallel to the edges.")
+      .def_readonly("success", &Report::success, doc::PoseGraphReport_success)
+      .def_readonly("reason", &Report::reason, doc::PoseGraphReport_reason)
+      .def_readonly("termination", &Report::termination, doc::PoseGraphReport_termination)
+      .def_property_readonly(
+          "start", [](const Report& report) { return ToString(report.start); }, doc::PoseGraphReport_start)
+      .def_readonly("iterations", &Report::iterations, doc::PoseGraphReport_iterations)
+      .def_readonly("initial_objective", &Report::initial_objective, doc::PoseGraphReport_initial_objective)
+      .def_readonly("objective", &Report::objective, "what was minimised, of the result")
+      .def_property_readonly(
+          "initial_costs", [](const Report& report) { return CostsOf(report.initial_costs); },
+          "chi2, chi2log and chordal (docs/backend.md) at the start that was taken")
+      .def_property_readonly(
+          "costs", [](const Report& report) { return CostsOf(report.costs); }, "the same of the result")
+      .def_property_readonly("chi2", OfEdges(&EdgeOutcome::chi2),
+                             (std::string("(E,) float64: ") + doc::EdgeOutcome_chi2).c_str())
+      .def_property_readonly("weights", OfEdges(&EdgeOutcome::weight),
+                             (std::string("(E,) float64: ") + doc::EdgeOutcome_weight).c_str())
+      .def_property_readonly("down_weighted", OfEdges(&EdgeOutcome::down_weighted),
+                             (std::string("(E,) bool: ") + doc::EdgeOutcome_down_weighted).c_str())
+      .def_readonly("time_s", &Report::time_s, doc::PoseGraphReport_time_s)
+      .def("__repr__", [](const Report& report) {
+        return py::str("OptimizationReport(success={}, termination='{}', iterations={}, objective={:.6g})")
+            .format(report.success, report.termination, report.iterations, report.objective);
+      });
+  py::class_<Certificate>(module, "Certificate", doc::Certificate)
+      .def(Pickled<Certificate>())
+      .def_readonly("available", &Certificate::available, doc::Certificate_available)
+      .def_readonly("certified", &Certificate::certified, doc::Certificate_certified)
+      .def_readonly("reason", &Certificate::reason, doc::Certificate_reason)
+      .def_readonly("chordal", &Certificate::chordal, doc::Certificate_chordal)
+      .def_readonly("lower_bound", &Certificate::lower_bound, doc::Certificate_lower_bound)
+      .def_readonly("relative_gap", &Certificate::relative_gap, doc::Certificate_relative_gap)
+      .def_readonly("min_eigenvalue_bound", &Certificate::min_eigenvalue_bound,
+                    doc::Certificate_min_eigenvalue_bound)
+      .def_readonly("time_s", &Certificate::time_s, "[s]")
+      .def("__repr__", [](const Certificate& certificate) {
+        return py::str("Certificate(certified={}, relative_gap={:.3g}, reason='{}')")
+            .format(certificate.certified, certificate.relative_gap, certificate.reason);
+      });
+}
+
 void BindPoseGraph(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   const CertificateOptions defaults;
   RunConfig graphs;
   graphs.graph = PoseGraphOptions();
-  const std::string text =
-      std::string(doc::PoseGraph) +
-      "\n\nkind: se2, se3 or sim3 (one camera, whose scale drifts). Poses map points of the node into "
-      "the world: x, y, z [m], qx, qy, qz, qw, and for sim3 a scale; or a matrix of 4 x 4; se2 also "
-      "x, y, heading [rad].";
-  const std::string optimize = std::string(doc::PoseGraphOptimizer_Optimize) +
-                               " Ctrl-C gives up; the graph then has its poses of before. Keywords, all "
-                               "optional; SLAM graphs that may hold "
-                               "false loops should use robust=\"gnc\":\n" +
-                               DescribeOptions("graph", graphs);
+  const std::string text = std::string(doc::PoseGraph) +
+                           "\n\nkind: se2, se3 or sim3 (one camera, whose scale drifts). Poses map points of "
+                           "the node into the world: x, y, z [m], qx, qy, qz, qw, and for sim3 a scale; or a "
+                           "matrix of 4 x 4; se2 also x, y, heading [rad].";
+  const std::string optimize =
+      std::string(doc::PoseGraphOptimizer_Optimize) +
+      " Ctrl-C gives up; the graph then has its poses of before. Keywords, all optional; SLAM graphs that "
+      "may hold false loops should use robust=\"gnc\":\n" +
+      DescribeOptions("graph", graphs);
   py::class_<Graph>(module, "PoseGraph", text.c_str())
       .def(py::init([](const std::string& kind) { return std::make_unique<Graph>(PoseGraph(KindOf(kind))); }),
            "kind"_a = "se3")
-      .def_static(
-          "read_g2o", &ReadGraph, "file"_a, "bad_information"_a = "refuse", "ignore_unknown"_a = false,
-          (std::string(
-               "bad_information: refuse, project, diagonal or skip. ignore_unknown: lines whose tag is "
-               "not known are left out, with a warning. ") +
-           doc::ReadG2o)
-              .c_str())
+      .def_static("read_g2o", &ReadGraph, "file"_a, "bad_information"_a = "refuse",
+                  "ignore_unknown"_a = false,
+                  (std::string("bad_information: refuse, project, diagonal or skip. ignore_unknown: lines "
+                               "whose tag is not known are left out, with a warning. ") +
+                   doc::ReadG2o)
+                      .c_str())
       .def(
           "write_g2o",
           [](Graph& self, const fs::path& file) {
@@ -209,32 +276,23 @@ void BindPoseGraph(py::module_& module) {
           (std::string("A node. fixed: ") + doc::PoseGraphNode_fixed + ". " + doc::PoseGraph_AddNode).c_str())
       .def("add_edge", &AddEdge, "from_id"_a, "to_id"_a, "pose"_a, "information"_a = py::none(),
            py::kw_only(), "sigmas"_a = py::none(), "loop"_a = py::none(),
-           (std::string(
-                "A measurement: pose maps points of to_id into from_id. information: inverse "
-                "covariance, (6, 6) of "
-                "translation [1/m^2] and rotation [1/rad^2]; se2 (3, 3) of x, y, heading; sim3 (7, "
-                "7), log scale "
-                "last. Or sigmas=(translation [m], rotation [rad][, log scale]). loop: robust losses "
-                "act on loops "
-                "alone; None: an edge whose ids are not neighbours among those of the graph (and of one "
-                "robot) is one. ") +
+           (std::string("A measurement: pose maps points of to_id into from_id. information: inverse "
+                        "covariance, (6, 6) of translation [1/m^2] and rotation [1/rad^2]; se2 (3, 3) of x, "
+                        "y, heading; sim3 (7, 7), log scale last. Or sigmas=(translation [m], rotation "
+                        "[rad][, log scale]). loop: robust losses act on loops alone; None: an edge whose "
+                        "ids are not neighbours among those of the graph (and of one robot) is one. ") +
             doc::PoseGraph_AddEdge)
                .c_str())
       .def(
           "set_pose",
           [](Graph& self, NodeId id, const py::object& pose) {
-            const GraphKind kind = self.Run([](PoseGraph& graph) { return graph.kind(); });
+            const GraphKind kind = Locked(&PoseGraph::kind)(self);
             const Similarity S_world_node = NodePose(pose, kind, "pose of node " + std::to_string(id));
             self.Run([&](PoseGraph& graph) { graph.SetPose(id, S_world_node); });
           },
           "id"_a, "pose"_a, "Moves a node. Raises tutti.InputError if there is no such id.")
-      .def(
-          "set_fixed",
-          [](Graph& self, NodeId id, bool fixed) {
-            self.Run([&](PoseGraph& graph) { graph.SetFixed(id, fixed); });
-          },
-          "id"_a, "fixed"_a,
-          "Whether the node is held where it is. Raises tutti.InputError if there is no such id.")
+      .def("set_fixed", Locked(&PoseGraph::SetFixed), "id"_a, "fixed"_a,
+           "Whether the node is held where it is. Raises tutti.InputError if there is no such id.")
       .def(
           "pose",
           [](Graph& self, NodeId id) {
@@ -244,18 +302,15 @@ void BindPoseGraph(py::module_& module) {
           "(4, 4) float64: S_world_node; sim3: rotation times scale. Raises tutti.InputError if there is "
           "none.")
       .def_property_readonly(
-          "kind",
-          [](Graph& self) { return WordOfKind(self.Run([](PoseGraph& graph) { return graph.kind(); })); },
-          "se2, se3 or sim3")
+          "kind", [](Graph& self) { return WordOfKind(Locked(&PoseGraph::kind)(self)); }, "se2, se3 or sim3")
       .def_property_readonly(
           "ids",
           [](Graph& self) {
-            const auto nodes = self.Run([](PoseGraph& graph) { return graph.nodes(); });
+            const auto nodes = Locked(&PoseGraph::nodes)(self);
             return Column<NodeId>(nodes.size(), [&](std::size_t k) { return nodes[k].id; });
           },
           "(N,) int64: of the nodes, in the order in which they were added. Ids of 2^63 and more in a file "
-          "are "
-          "negative here; write_g2o writes them as they were")
+          "are negative here; write_g2o writes them as they were")
       .def_property_readonly("landmark_ids", &LandmarkIds, "(L,) int64: of the landmarks of a file")
       .def_property_readonly(
           "landmarks", &LandmarkPositions,
@@ -265,14 +320,14 @@ void BindPoseGraph(py::module_& module) {
       .def_property_readonly(
           "scales",
           [](Graph& self) {
-            const auto nodes = self.Run([](PoseGraph& graph) { return graph.nodes(); });
+            const auto nodes = Locked(&PoseGraph::nodes)(self);
             return Column<double>(nodes.size(), [&](std::size_t k) { return nodes[k].pose.scale; });
           },
           "(N,) float64, parallel to ids: 1 unless the graph is sim3")
       .def_property_readonly(
           "edges", &EdgesOf,
-          "Columns, in the order in which edges were added: from, to (E,) int64; loop (E,) bool; "
-          "measurement (E, 7), x, y, z [m], qx, qy, qz, qw of T_from_to; scale (E,).")
+          "Columns, in the order in which edges were added: from, to (E,) int64; loop (E,) bool; measurement "
+          "(E, 7), x, y, z [m], qx, qy, qz, qw of T_from_to; scale (E,).")
       .def(
           "costs",
           [](Graph& self) {

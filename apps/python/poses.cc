@@ -1,4 +1,4 @@
-#include "apps/python/poses.h"
+#include "apps/python/arrays.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // tutti.SlamSystem
-#include "tutti/slam/slam_system.h"
 #include "tutti/slam/localizer.h"
+#include "tutti/slam/slam_system.h"
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -10,13 +10,10 @@
 #include <optional>
 #include <string>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/guarded.h"
-#include "apps/python/images.h"
-#include "apps/python/options.h"
 #include "apps/python/pickled.h"
-#include "apps/python/poses.h"
 
 namespace tutti::python {
 namespace {
@@ -29,8 +26,7 @@ struct System {
   std::optional<Localizer> localizer;
   const Odometry* odometry() const { return localizer ? &localizer->odometry() : slam->odometry(); }
   void CheckMaps(const char* what) const {
-    if (localizer)
-      throw InputError(std::string("frames are only being located in the map: it can't ") + what);
+    if (localizer) throw InputError(std::string("frames are only being located in the map: it can't ") + what);
   }
 };
 using Slam = Guarded<System>;
@@ -39,11 +35,8 @@ std::unique_ptr<Slam> MakeSlam(const CameraRig& rig, const std::optional<RunConf
                                const py::kwargs& sections) {
   RunConfig all = config.value_or(RunConfig());
   SetOptions("SlamSystem", "", sections, all);
-  const auto make = [&] {
-    const py::gil_scoped_release release;
-    return std::make_unique<Slam>(System{std::make_unique<SlamSystem>(all, rig), {}});
-  };
-  return make();
+  const py::gil_scoped_release release;
+  return std::make_unique<Slam>(System{std::make_unique<SlamSystem>(all, rig), {}});
 }
 
 std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads) {
@@ -112,10 +105,9 @@ void BindResults(py::module_& module) {
           "state", [](const TrackResult& result) { return ToString(result.state); },
           "initializing, tracking or lost")
       .def_readonly("reason", &TrackResult::reason, doc::TrackResult_reason)
-      .def_property_readonly(
-          "T_world_camera", &OptionalPose,
-          "(4, 4) float64; None if the frame has no pose. What it was then: trajectory() has what loops "
-          "made of it.")
+      .def_property_readonly("T_world_camera", &OptionalPose,
+                             "(4, 4) float64; None if the frame has no pose. What it was then: trajectory() "
+                             "has what loops made of it.")
       .def_readonly("features", &TrackResult::features, doc::TrackResult_features)
       .def_readonly("inliers", &TrackResult::inliers, doc::TrackResult_inliers)
       .def_readonly("keyframe", &TrackResult::keyframe, "id of the keyframe that this frame became, or -1")
@@ -197,108 +189,52 @@ void BindSlamSystem(py::module_& module) {
   BindKeyframe(module);
   const std::string text = std::string(doc::SlamSystem) +
                            "\n\nSlamSystem(dataset.rig, config, run={\"threads\": 1}): sections of the "
-                           "configuration are keywords, as in "
-                           "Config.";
+                           "configuration are keywords, as in Config.";
   py::class_<Slam>(module, "SlamSystem", text.c_str())
       .def(py::init(&MakeSlam), "rig"_a, "config"_a = py::none(),
            "Raises tutti.InputError if the configuration does not fit the rig.")
       .def_static("load", &LoadSlam, "file"_a, "threads"_a = py::none(),
                   "Goes on from a file that save wrote exactly as the saved one would have gone on, with so "
-                  "many threads "
-                  "(None: as saved). Raises tutti.InputError for a file that is not usable.")
-      .def(
-          "track",
-          [](Slam& slam, const InputFrame& frame) {
-            return slam.Run(
-                [&](System& s) { return s.localizer ? s.localizer->Track(frame) : s.slam->Track(frame); });
-          },
-          "frame"_a, doc::SlamSystem_Track)
-      .def(
-          "finish",
-          [](Slam& slam) {
-            slam.Run([](System& s) {
-              if (!s.localizer) s.slam->Finish();
-            });
-          },
-          doc::SlamSystem_Finish)
+                  "many threads (None: as saved). Raises tutti.InputError for a file that is not usable.")
+      .def("track", Locked(&SlamSystem::Track), "frame"_a, doc::SlamSystem_Track)
+      .def("finish", Locked(&SlamSystem::Finish), doc::SlamSystem_Finish)
       .def(
           "save",
           [](Slam& slam, const fs::path& file) {
             Writing([&] { slam.Run([&](System& s) { s.slam->Snapshot().Write(file); }); });
           },
           "file"_a, doc::SlamSystem_Snapshot)
-      .def(
-          "begin_localization", [](Slam& slam) { slam.Run([](System& s) { s.localizer.emplace(*s.slam); }); },
-          doc::Localizer)
-      .def(
-          "begin_session",
-          [](Slam& slam, const CameraRig& rig) {
-            slam.Run([&](System& s) {
-              s.CheckMaps("go on");
-              s.slam->BeginSession(rig);
-            });
-          },
-          "rig"_a, doc::SlamSystem_BeginSession)
-      .def(
-          "prune",
-          [](Slam& slam) {
-            return slam.Run([](System& s) {
-              s.CheckMaps("be pruned");
-              return s.slam->Prune();
-            });
-          },
-          doc::SlamSystem_Prune)
+      .def("begin_localization", Locked(&SlamSystem::BeginLocalization), doc::Localizer)
+      .def("begin_session", Locked(&SlamSystem::BeginSession), "rig"_a, doc::SlamSystem_BeginSession)
+      .def("prune", Locked(&SlamSystem::Prune), doc::SlamSystem_Prune)
       .def(
           "trajectory",
           [](Slam& slam, int piece) {
-            return ArrayOf(
-                WithOdometry(slam, [&](const Odometry& o) { return FrameTrajectory(o.map(), piece); }));
+            return ArrayOf(WithOdometry(slam, [&](const Odometry& o) { return FrameTrajectory(o.map(), piece); }));
           },
           "piece"_a = -1,
-          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::FrameTrajectory).c_str())
+          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::FrameTrajectory)
+              .c_str())
       .def("keyframe_trajectory", &KeyframeTrajectory,
            "(N, 8), as trajectory: of all keyframes, in the order of keyframe_ids.")
       .def("keyframe", &Keyframe, "id"_a, doc::ViewOf)
       .def_property_readonly(
           "keyframe_ids",
-          [](Slam& slam) {
-            return WithOdometry(slam, [](const Odometry& o) { return o.map().KeyframeIds(); });
-          },
+          [](Slam& slam) { return WithOdometry(slam, [](const Odometry& o) { return o.map().KeyframeIds(); }); },
           doc::Map_KeyframeIds)
       .def("landmarks", &Landmarks, "(N, 3) float64: points of the map in the world [m], by id.")
-      .def_property_readonly(
-          "loops", [](Slam& slam) { return slam.Run([](System& s) { return s.slam->loops(); }); },
-          doc::SlamSystem_loops)
+      .def_property_readonly("loops", Locked(&SlamSystem::loops), doc::SlamSystem_loops)
       .def(
           "graph",
-          [](Slam& slam) {
-            return std::make_unique<Guarded<PoseGraph>>(slam.Run([](System& s) { return s.slam->Graph(); }));
-          },
+          [](Slam& slam) { return std::make_unique<Guarded<PoseGraph>>(Locked(&SlamSystem::Graph)(slam)); },
           doc::SlamSystem_Graph)
-      .def_property_readonly(
-          "appearance_only",
-          [](Slam& slam) { return slam.Run([](System& s) { return s.odometry() == nullptr; }); },
-          doc::SlamSystem_odometry)
-      .def_property_readonly(
-          "corrections",
-          [](Slam& slam) { return slam.Run([](System& s) { return s.slam->Report().corrections; }); },
-          doc::SlamReport_corrections)
-      .def_property_readonly(
-          "relocalized",
-          [](Slam& slam) {
-            return slam.Run([](System& s) {
-              return s.localizer ? s.localizer->Relocalized() : s.slam->Report().relocalized;
-            });
-          },
-          doc::SlamReport_relocalized)
-      .def(
-          "take_warnings",
-          [](Slam& slam) { return slam.Run([](System& s) { return s.slam->TakeWarnings(); }); },
-          doc::SlamSystem_TakeWarnings)
-      .def_property_readonly(
-          "stage_ms",
-          [](Slam& slam) { return slam.Run([](System& s) { return s.slam->Report().stage_ms; }); },
-          doc::SlamReport_stage_ms);
+      .def_property_readonly("appearance_only", Locked(&SlamSystem::AppearanceOnly),
+                             doc::SlamSystem_odometry)
+      .def_property_readonly("corrections", Locked(&SlamSystem::Corrections), doc::SlamReport_corrections)
+      .def_property_readonly("relocalized", Locked(&SlamSystem::Relocalized), doc::SlamReport_relocalized)
+      .def("take_warnings", Locked(&SlamSystem::TakeWarnings), doc::SlamSystem_TakeWarnings)
+      .def_property_readonly("stage_ms", Locked(&SlamSystem::StageMilliseconds),
+                             doc::SlamReport_stage_ms);
 }
 
 }  // namespace tutti::python

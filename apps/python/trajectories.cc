@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <optional>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/poses.h"
 #include "tutti/backend/trajectory_file.h"
 
 namespace tutti::python {
@@ -60,11 +60,9 @@ void BindTrajectories(py::module_& module) {
   module.def(
       "read_trajectory", &ReadRows, py::arg("file"), py::arg("format") = py::none(),
       py::arg("times") = std::vector<double>(),
-      (std::string(
-           "Returns (N, 8) of float64: stamp [s], x, y, z [m], qx, qy, qz, qw (all 0: positions alone); "
-           "T_world_body. `format`: "
-           "\"tum\", \"kitti\", \"euroc\", \"g2o\"; None: by the content. `times`: stamps [s] of "
-           "KITTI's lines (one each), or of g2o's ids.\n\n") +
+      (std::string("Returns (N, 8) of float64: stamp [s], x, y, z [m], qx, qy, qz, qw (all 0: positions "
+                   "alone); T_world_body. `format`: \"tum\", \"kitti\", \"euroc\", \"g2o\"; None: by the "
+                   "content. `times`: stamps [s] of KITTI's lines (one each), or of g2o's ids.\n\n") +
        doc::ReadPoseFile)
           .c_str());
   module.def(

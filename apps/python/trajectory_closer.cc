@@ -8,11 +8,9 @@
 #include <string>
 #include <utility>
 
+#include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
-#include "apps/python/guarded.h"
-#include "apps/python/options.h"
-#include "apps/python/poses.h"
 #include "apps/slam/odometry_jumps.h"
 #include "tutti/backend/evaluation.h"
 
@@ -36,16 +34,9 @@ TrackResult Push(TrajectoryCloser& closer, const InputFrame& frame, const py::ob
   return closer.Push(frame, pose, of_motion);
 }
 
-// work(closer) without the interpreter's lock.
-template <class Work>
-auto Free(const TrajectoryCloser& closer, Work work) {
-  const py::gil_scoped_release release;
-  return work(closer);
-}
-
 py::array_t<double> Corrected(const TrajectoryCloser& closer, const py::object& odometry) {
   const Trajectory given = TrajectoryOf(odometry, "odometry");
-  return ArrayOf(Free(closer, [&](const TrajectoryCloser& c) { return c.Corrected(given); }));
+  return ArrayOf(Free(&TrajectoryCloser::Corrected)(closer, given));
 }
 
 std::unique_ptr<TrajectoryCloser> Close(const py::object& odometry, const py::object& dataset,
@@ -71,7 +62,7 @@ std::unique_ptr<TrajectoryCloser> Close(const py::object& odometry, const py::ob
   if (!pushed)
     throw InputError(
         "close: odometry has no pose for any image; check the unit and the clock of its time stamps");
-  Free(*closer, [&](const TrajectoryCloser&) { closer->Finish(); });
+  Free (&TrajectoryCloser::Finish)(*closer);
   for (const std::string& warning : closer->TakeWarnings()) Warn(warning);
   return closer;
 }
@@ -88,66 +79,42 @@ void BindTrajectoryCloser(py::module_& module) {
                        const py::kwargs& sections) { return MakeCloser(rig, config, sections); }),
            "rig"_a, "config"_a = py::none(),
            "Raises tutti.InputError if the configuration does not fit the rig.")
-      .def(
-          "push", &Push, "frame"_a, "T_odom_body"_a, "sigma"_a = py::none(),
-          (std::string("`T_odom_body`: (4, 4), or (7,) of x, y, z [m], qx, qy, qz, qw. `sigma`: (translation "
-                       "[m], rotation [rad]), on each axis.\n\n") +
-           doc::TrajectoryCloser_Push)
-              .c_str())
-      .def(
-          "finish", [](TrajectoryCloser& c) { Free(c, [&](const TrajectoryCloser&) { c.Finish(); }); },
-          doc::TrajectoryCloser_Finish)
+      .def("push", &Push, "frame"_a, "T_odom_body"_a, "sigma"_a = py::none(),
+           (std::string("`T_odom_body`: (4, 4), or (7,) of x, y, z [m], qx, qy, qz, qw. `sigma`: "
+                        "(translation [m], rotation [rad]), on each axis.\n\n") +
+            doc::TrajectoryCloser_Push)
+               .c_str())
+      .def("finish", Free(&TrajectoryCloser::Finish), doc::TrajectoryCloser_Finish)
       .def_property_readonly(
           "T_map_odom",
-          [](const TrajectoryCloser& c) {
-            return ArrayOf(Free(c, [](const TrajectoryCloser& free) { return free.T_map_odom(); }));
-          },
+          [](const TrajectoryCloser& c) { return ArrayOf(Free(&TrajectoryCloser::T_map_odom)(c)); },
           (std::string("(4, 4) float64. ") + doc::TrajectoryCloser_T_map_odom).c_str())
       .def("corrected", &Corrected, "odometry"_a,
-           (std::string("`odometry` and what is returned: (N, 8) of stamp [s], x, y, z [m], qx, qy, qz, "
-                        "qw.\n\n") +
+           (std::string(
+                "`odometry` and what is returned: (N, 8) of stamp [s], x, y, z [m], qx, qy, qz, qw.\n\n") +
             doc::TrajectoryCloser_Corrected)
                .c_str())
       .def(
           "keyframes",
-          [](const TrajectoryCloser& c) {
-            return ArrayOf(Free(c, [](const TrajectoryCloser& free) { return free.Keyframes(); }));
-          },
+          [](const TrajectoryCloser& c) { return ArrayOf(Free(&TrajectoryCloser::Keyframes)(c)); },
           (std::string("(N, 8), as corrected. ") + doc::TrajectoryCloser_Keyframes).c_str())
-      .def_property_readonly(
-          "loops",
-          [](const TrajectoryCloser& c) {
-            return Free(c, [](const TrajectoryCloser& free) { return free.Loops(); });
-          },
-          doc::TrajectoryCloser_Loops)
+      .def_property_readonly("loops", Free(&TrajectoryCloser::Loops), doc::TrajectoryCloser_Loops)
       .def(
           "graph",
           [](const TrajectoryCloser& c) {
-            return std::make_unique<Guarded<PoseGraph>>(
-                Free(c, [](const TrajectoryCloser& free) { return free.Graph(); }));
+            return std::make_unique<Guarded<PoseGraph>>(Free(&TrajectoryCloser::Graph)(c));
           },
           doc::TrajectoryCloser_Graph)
-      .def_property_readonly(
-          "corrections",
-          [](const TrajectoryCloser& c) {
-            return Free(c, [](const TrajectoryCloser& free) { return free.Corrections(); });
-          },
-          doc::TrajectoryCloser_Corrections)
-      .def(
-          "take_warnings",
-          [](TrajectoryCloser& c) {
-            return Free(c, [&](const TrajectoryCloser&) { return c.TakeWarnings(); });
-          },
-          doc::TrajectoryCloser_TakeWarnings);
-  module.def(
-      "close", &Close, "odometry"_a, "dataset"_a, "config"_a = py::none(), "max_gap_s"_a = 1.0,
-      "Loops for a whole recording: pushes each frame of `dataset` (Dataset) with the pose that "
-      "`odometry` has at its time, and finishes. `odometry`: (N, 8) of stamp [s], x, y, z [m], qx, qy, "
-      "qz, qw; T_odom_body. Poses are interpolated where they are at most `max_gap_s` [s] apart; other "
-      "frames are left out. Returns the TrajectoryCloser: corrected(odometry) is the corrected "
-      "trajectory. Warns if the images show "
-      "that the odometry is less certain than configured. Raises tutti.InputError if no frame has a "
-      "pose.");
+      .def_property_readonly("corrections", Free(&TrajectoryCloser::Corrections),
+                             doc::TrajectoryCloser_Corrections)
+      .def("take_warnings", Free(&TrajectoryCloser::TakeWarnings), doc::TrajectoryCloser_TakeWarnings);
+  module.def("close", &Close, "odometry"_a, "dataset"_a, "config"_a = py::none(), "max_gap_s"_a = 1.0,
+             "Loops for a whole recording: pushes each frame of `dataset` (Dataset) with the pose that "
+             "`odometry` has at its time, and finishes. `odometry`: (N, 8) of stamp [s], x, y, z [m], qx, "
+             "qy, qz, qw; T_odom_body. Poses are interpolated where they are at most `max_gap_s` [s] apart; "
+             "other frames are left out. Returns the TrajectoryCloser: corrected(odometry) is the corrected "
+             "trajectory. Warns if the images show that the odometry is less certain than configured. Raises "
+             "tutti.InputError if no frame has a pose.");
 }
 
 }  // namespace tutti::python

@@ -1,5 +1,4 @@
-#include "apps/report/comparison_report.h"
-
+// Pages over several runs, and the reports of runs that they are made of.
 #include <algorithm>
 #include <cstddef>
 #include <map>
@@ -78,15 +77,14 @@ Json SingleRunPage(Json run) {
 
 Json ComparisonPage(const std::string& title, const std::vector<ReportTable>& tables, std::vector<Json> runs,
                     const std::vector<std::string>& failures) {
-  Json page = {
-      {"kind", "comparison"},
-      {"title", title},
-      {"subtitle",
-       "Tables: means over runs, +- half of the 95 % confidence interval. Charts: the first run of each "
-       "variant."},
-      {"tables", Json::array()},
-      {"failures", failures},
-      {"runs", Json::array()}};
+  Json page = {{"kind", "comparison"},
+               {"title", title},
+               {"subtitle",
+                "Tables: means over runs, +- half of the 95 % confidence interval. Charts: the first run of "
+                "each variant."},
+               {"tables", Json::array()},
+               {"failures", failures},
+               {"runs", Json::array()}};
   for (const ReportTable& table : tables) {
     page["tables"].push_back({{"dataset", table.dataset},
                               {"header", table.header},

@@ -1,9 +1,9 @@
-#include "apps/report/detection_log.h"
-
+// What is kept of the loop detector's answers.
 #include <algorithm>
 #include <cmath>
 #include <set>
 
+#include "apps/report/run_report.h"
 #include "apps/slam/map_state.h"
 #include "core/state_archive.h"
 

@@ -65,26 +65,13 @@ int TrueColumn(const LoopGroundTruth& truth, int row) {
 }  // namespace
 
 const char* ToString(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::kAccepted:
-      return "accepted";
-    case Outcome::kFalse:
-      return "false";
-    case Outcome::kRejected:
-      return "rejected";
-    case Outcome::kMissed:
-      return "missed";
-  }
-  return "?";
+  constexpr const char* kWords[] = {"accepted", "false", "rejected", "missed"};
+  return kWords[static_cast<int>(outcome)];
 }
 
 std::vector<std::size_t> Thinned(std::size_t size, std::size_t most) {
-  std::vector<std::size_t> out;
-  if (size <= most) {
-    for (std::size_t k = 0; k < size; ++k) out.push_back(k);
-    return out;
-  }
-  for (std::size_t k = 0; k < most; ++k) out.push_back(k * (size - 1) / (most - 1));
+  std::vector<std::size_t> out(std::min(size, most));
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = size <= most ? k : k * (size - 1) / (most - 1);
   return out;
 }
 

@@ -1,18 +1,14 @@
 // The parts of a run's report.
 #pragma once
 
-#include <Eigen/Core>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "apps/report/base64.h"
-#include "apps/report/detection_log.h"
-#include "apps/run/run_result.h"
+#include "apps/report/page.h"
+#include "apps/report/run_report.h"
 #include "tutti/loopclosure/ground_truth.h"
 
 namespace tutti::report {
@@ -82,10 +78,5 @@ Json PosteriorJson(const RunResult& result, const DetectionLog& log, const std::
 
 /// Pictures of some of each outcome: {"note", "entries": [{"outcome", "title", "text", "picture"}]}.
 Json GalleryJson(const RunResult& result, const std::vector<ShownLoop>& loops);
-
-/// Stages, frame times, processor time, memory.
-Json TimingJson(const RunResult& result);
-/// Sections of the configuration, and what the program was built with.
-Json ConfigurationJson(const RunResult& result);
 
 }  // namespace tutti::report

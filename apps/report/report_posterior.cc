@@ -49,45 +49,45 @@ Grid MakeGrid(const std::vector<LoggedDetection>& detections) {
   return grid;
 }
 
-Json Packed(const std::string& name, const std::vector<unsigned char>& bytes) {
-  return {{"name", name}, {"q", Base64(bytes.data(), bytes.size())}};
-}
-
-Json PosteriorMap(const std::string& name, const std::vector<LoggedDetection>& detections, const Grid& grid,
-                  std::size_t opinion) {
+// One opinion in the cells: `fill` raises those of an image by raise(row, byte).
+template <class Fill>
+Json CellsJson(const std::vector<LoggedDetection>& detections, const Grid& grid, std::size_t opinion,
+               const Fill& fill) {
   std::vector<unsigned char> bytes(grid.cells * grid.cells, 0);
   for (std::size_t column = 0; column < grid.cells; ++column) {
     const LoggedDetection& detection = detections[grid.shown[column]];
     if (opinion >= detection.opinions.size()) continue;
-    for (const auto& [location, p] : detection.opinions[opinion].posterior) {
-      const int row = RowOf(grid, location);
-      if (row < 0) continue;
-      unsigned char& cell = bytes[static_cast<std::size_t>(row) * grid.cells + column];
-      const double root = std::sqrt(std::clamp(static_cast<double>(p), 0.0, 1.0));
-      cell = std::max(cell, static_cast<unsigned char>(std::lround(255 * root)));
-    }
+    fill(detection, detection.opinions[opinion], [&](std::size_t row, unsigned char value) {
+      unsigned char& cell = bytes[row * grid.cells + column];
+      cell = std::max(cell, value);
+    });
   }
-  return Packed(name, bytes);
+  return {{"name", detections.back().opinions[opinion].name}, {"q", Base64(bytes.data(), bytes.size())}};
 }
 
-Json EvidenceMap(const std::string& name, const std::vector<LoggedDetection>& detections, const Grid& grid,
-                 std::size_t opinion) {
-  std::vector<unsigned char> bytes(grid.cells * grid.cells, 0);
-  for (std::size_t column = 0; column < grid.cells; ++column) {
-    const LoggedDetection& detection = detections[grid.shown[column]];
-    if (opinion >= detection.opinions.size()) continue;
-    const std::vector<std::uint8_t>& evidence = detection.opinions[opinion].evidence;
-    for (std::size_t g = 0; g < evidence.size(); ++g) {
-      const std::size_t first = g * detection.group;
-      const std::size_t last = std::min(first + detection.group, detections.size()) - 1;
-      for (std::size_t row = CellOf(first, detections.size(), grid.cells);
-           row <= CellOf(last, detections.size(), grid.cells); ++row) {
-        unsigned char& cell = bytes[row * grid.cells + column];
-        cell = std::max(cell, evidence[g]);
-      }
-    }
-  }
-  return Packed(name, bytes);
+Json PosteriorMap(const std::vector<LoggedDetection>& detections, const Grid& grid, std::size_t opinion) {
+  return CellsJson(
+      detections, grid, opinion, [&](const LoggedDetection&, const LoggedOpinion& of, const auto& raise) {
+        for (const auto& [location, p] : of.posterior) {
+          const int row = RowOf(grid, location);
+          const double root = std::sqrt(std::clamp(static_cast<double>(p), 0.0, 1.0));
+          if (row >= 0)
+            raise(static_cast<std::size_t>(row), static_cast<unsigned char>(std::lround(255 * root)));
+        }
+      });
+}
+
+Json EvidenceMap(const std::vector<LoggedDetection>& detections, const Grid& grid, std::size_t opinion) {
+  const auto cell_of = [&](std::size_t k) { return CellOf(k, detections.size(), grid.cells); };
+  return CellsJson(detections, grid, opinion,
+                   [&](const LoggedDetection& detection, const LoggedOpinion& of, const auto& raise) {
+                     for (std::size_t g = 0; g < of.evidence.size(); ++g) {
+                       const std::size_t first = g * detection.group;
+                       const std::size_t last = std::min(first + detection.group, detections.size()) - 1;
+                       for (std::size_t row = cell_of(first); row <= cell_of(last); ++row)
+                         raise(row, of.evidence[g]);
+                     }
+                   });
 }
 
 Json GeometryJson(const RunResult& result, const Verification& geometry, const Grid& grid) {
@@ -188,11 +188,11 @@ Json PosteriorJson(const RunResult& result, const DetectionLog& log, const std::
   const std::size_t first = names.size() == 2 ? 1 : 0;  // a member alone is the whole ensemble
   json["maps"] = Json::array();
   for (std::size_t o = first; o < names.size(); ++o)
-    json["maps"].push_back(PosteriorMap(names[o].name, detections, grid, o));
+    json["maps"].push_back(PosteriorMap(detections, grid, o));
   json["evidence"] = {{"zero", EvidenceByte::kZero}, {"step", EvidenceByte::kStep}, {"maps", Json::array()}};
   const bool joint = result.config.loops.rule == CombinationRule::kJoint;
   for (std::size_t o = 0; o + (joint ? 0 : 1) < names.size(); ++o)
-    json["evidence"]["maps"].push_back(EvidenceMap(names[o].name, detections, grid, o));
+    json["evidence"]["maps"].push_back(EvidenceMap(detections, grid, o));
   json["images"] = Json::array();
   const Outcomes outcomes = OutcomesOf(loops);
   for (const std::size_t k : grid.shown)

@@ -1,13 +1,10 @@
 #include "apps/report/run_report.h"
 
 #include <algorithm>
-#include <cstdio>
 
-#include "apps/report/build_info.h"
-#include "apps/report/page.h"
 #include "apps/report/report_parts.h"
-#include "apps/run/frame_places.h"
 #include "apps/run/outputs.h"
+#include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
@@ -20,39 +17,33 @@ namespace {
 constexpr std::size_t kMostPoses = 2000;  // of a trajectory
 constexpr std::size_t kMostErrors = 1500;
 constexpr std::size_t kMostFrameTimes = 1000;
-constexpr double kMaxDifference = 0.01;  // of time stamps [s], as the run's own evaluation
 
-Json PathJson(const Trajectory& trajectory, const Similarity& alignment) {
-  Json t = Json::array(), x = t, y = t, z = t;
-  const double origin = trajectory.empty() ? 0 : trajectory.front().stamp_s;
-  for (const std::size_t k : Thinned(trajectory.size(), kMostPoses)) {
-    const Eigen::Vector3d p = alignment * trajectory[k].pose.translation;
-    t.push_back(Rounded(trajectory[k].stamp_s - origin, 3));
-    x.push_back(Rounded(p.x(), 4));
-    y.push_back(Rounded(p.y(), 4));
-    z.push_back(Rounded(p.z(), 4));
-  }
-  return {{"t", t}, {"x", x}, {"y", y}, {"z", z}};
-}
-
-Json PointsJson(const std::vector<Eigen::Vector3d>& points, const Similarity& alignment) {
+Json PointsJson(const std::vector<Eigen::Vector3d>& points, const Similarity& alignment, int decimals) {
   Json x = Json::array(), y = x, z = x;
   for (const Eigen::Vector3d& point : points) {
     const Eigen::Vector3d p = alignment * point;
-    x.push_back(Rounded(p.x(), 3));
-    y.push_back(Rounded(p.y(), 3));
-    z.push_back(Rounded(p.z(), 3));
+    x.push_back(Rounded(p.x(), decimals));
+    y.push_back(Rounded(p.y(), decimals));
+    z.push_back(Rounded(p.z(), decimals));
   }
   return {{"x", x}, {"y", y}, {"z", z}};
 }
 
+Json PathJson(const Trajectory& trajectory, const Similarity& alignment) {
+  Json path = {{"t", Json::array()}};
+  std::vector<Eigen::Vector3d> points;
+  for (const std::size_t k : Thinned(trajectory.size(), kMostPoses)) {
+    path["t"].push_back(Rounded(trajectory[k].stamp_s - trajectory.front().stamp_s, 3));
+    points.push_back(trajectory[k].pose.translation);
+  }
+  path.update(PointsJson(points, alignment, 4));
+  return path;
+}
+
 Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
-  EvaluationOptions options;
-  options.alignment =
-      result.rig.sensor == Sensor::kMono ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSE3;
-  options.max_time_difference_s = kMaxDifference;
   try {
-    const EvaluationReport evaluation = EvaluateTrajectory(result.reference, estimate, options);
+    const EvaluationReport evaluation =
+        EvaluateTrajectory(result.reference, estimate, EvaluationWith(result.rig.sensor == Sensor::kMono));
     std::vector<double> path;
     const std::vector<Pose>& reference = evaluation.poses.reference;
     for (std::size_t k = 0; k < evaluation.pairs; ++k)
@@ -82,8 +73,7 @@ Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
 
 Json PointJson(const Eigen::Vector3d& p) { return {Rounded(p.x(), 4), Rounded(p.y(), 4), Rounded(p.z(), 4)}; }
 
-Json EdgesJson(const RunResult& result, const std::vector<ShownLoop>& loops, const Similarity& alignment) {
-  const FramePlaces places(result, alignment);
+Json EdgesJson(const std::vector<ShownLoop>& loops, const FramePlaces& places) {
   Json edges = Json::array();
   for (const ShownLoop& loop : loops) {
     const auto a = places.AtEnd(loop.candidate, loop.candidate_stamp_s),
@@ -107,8 +97,7 @@ Json EdgesJson(const RunResult& result, const std::vector<ShownLoop>& loops, con
 }
 
 // Frames that were found in the map, where they are in the trajectory.
-Json FoundJson(const RunResult& result, const Similarity& alignment) {
-  const FramePlaces places(result, alignment);
+Json FoundJson(const RunResult& result, const FramePlaces& places) {
   Json found = Json::array();
   for (const FoundFrame& frame : result.found) {
     const auto p = places.At(frame.stamp_s);
@@ -168,8 +157,7 @@ Json FiguresJson(const RunResult& r) {
   return json;
 }
 
-}  // namespace
-
+// Stages and frame times.
 Json TimingJson(const RunResult& result) {
   Json stages = Json::array();
   for (const auto& [name, ms] : result.stage_ms) stages.push_back({{"name", name}, {"ms", Rounded(ms, 2)}});
@@ -184,6 +172,7 @@ Json TimingJson(const RunResult& result) {
   return {{"stages", stages}, {"frame_ms", frames}, {"frames", result.frame_ms.size()}};
 }
 
+// Sections of the configuration, and what the program was built with.
 Json ConfigurationJson(const RunResult& result) {
   Json sections = Json::array();
   for (const ConfigEntry& entry : DescribeConfig(result.config)) {
@@ -199,13 +188,12 @@ Json ConfigurationJson(const RunResult& result) {
           {"versions", BuildInfo()}};
 }
 
-namespace {
-
 Json ReportJson(const RunResult& result, const DetectionLog& log, const std::string& variant) {
   Similarity align_slam, align_odometry;
   const bool scored = result.evaluation && result.evaluation->slam.valid;
   if (scored) align_slam = align_odometry = result.evaluation->slam.alignment;
   if (scored && result.evaluation->odometry.valid) align_odometry = result.evaluation->odometry.alignment;
+  const FramePlaces places(result, align_slam);
   const KnownLoops known = FindKnownLoops(result, log);
   const std::vector<ShownLoop> loops = ShownLoops(result, log, known);
   Json json;
@@ -226,9 +214,9 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["earlier"] = Json::array();
   for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k)
     json["earlier"].push_back(PathJson(result.map->earlier[k], align_slam));
-  json["landmarks"] = PointsJson(log.landmarks(), align_slam);
-  json["found"] = FoundJson(result, align_slam);
-  json["loops"] = EdgesJson(result, loops, align_slam);
+  json["landmarks"] = PointsJson(log.landmarks(), align_slam, 3);
+  json["found"] = FoundJson(result, places);
+  json["loops"] = EdgesJson(loops, places);
   json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},
                     {"slam", scored ? ErrorJson(result, result.trajectory) : Json()}};
   json["precision_recall"] = PrecisionRecallJson(result, log, known);

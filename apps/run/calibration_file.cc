@@ -4,8 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "apps/run/calibration_formats.h"
-#include "apps/run/calibration_table.h"
+#include "apps/run/calibration_keys.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
 
@@ -14,18 +13,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the odometry benchmark (P0), of raw recordings and KITTI-360 (P_rect_00): rectified images.
+// The odometry benchmark (P0), raw recordings and KITTI-360 (P_rect_00) give rectified images.
 Calibration FromKitti(const CalibrationDocument& file) {
   for (const auto& [left, right] :
        {std::pair("P0", "P1"), std::pair("P2", "P3"), std::pair("P_rect_00", "P_rect_01")}) {
-    const KeyValue P = file.root.Find({left}), P_right = file.root.Find({right});
+    const KeyValue P = file.Find({left}), P_right = file.Find({right});
     if (!P) continue;
     Calibration out;
     out.format = std::string("KITTI, ") + left + " of rectified images";
-    const std::array<double, 12> of_left = file.root.Array<12>(P);
-    out.camera = CameraOfMatrix(file.root, P);
+    const std::array<double, 12> of_left = file.Array<12>(P);
+    out.camera = CameraOfMatrix(file, P);
     if (P_right) {
-      const std::array<double, 12> of_right = file.root.Array<12>(P_right);
+      const std::array<double, 12> of_right = file.Array<12>(P_right);
       out.baseline_m = std::abs(of_left[3] / of_left[0] - of_right[3] / of_right[0]);
     }
     return out;
@@ -37,21 +36,21 @@ Calibration FromKitti(const CalibrationDocument& file) {
 
 void CheckFrames(const CalibrationDocument& file, const YAML::Node& frames) {
   for (const YAML::Node& frame : frames) {
-    if (!frame.IsMap()) file.root.Fail(frame, "'frames' is no list of frames");
+    if (!frame.IsMap()) file.Fail(frame, "'frames' is no list of frames");
     for (const char* name : {"fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2"}) {
       if (file.At(frame).Number({name}) != file.At(frames[0]).Number({name}))
-        file.root.Fail(frame, std::string("this frame has another '") + name +
-                                  "' than the first one; one camera for all images is needed");
+        file.Fail(frame, std::string("this frame has another '") + name +
+                             "' than the first one; one camera for all images is needed");
     }
   }
 }
 
 Calibration FromNerf(const CalibrationDocument& file) {
   const YAML::Node frames = file["frames"];
-  CalibrationKeys keys = file.root;
+  CalibrationKeys keys = file;
   if (frames.IsDefined() && frames.IsSequence() && frames.size() > 0) {
     CheckFrames(file, frames);
-    keys = file.At(frames[0]).Or(file.root.map());
+    keys = file.At(frames[0]).Or(file.map());
   }
   const std::optional<double> width = keys.Number({"w"}), height = keys.Number({"h"});
   std::optional<double> focal = keys.Number({"fl_x"});
@@ -92,7 +91,7 @@ const PairNames* PairOf(const CalibrationDocument& file) {
 
 Calibration FromPair(const CalibrationDocument& file) {
   const PairNames& names = *PairOf(file);
-  const CalibrationKeys& keys = file.root;
+  const CalibrationKeys& keys = file;
   const std::string lens = LensName(keys);
   std::string note;
   Calibration out;
@@ -117,7 +116,7 @@ bool IsTuttis(const CalibrationDocument& file) {
 }
 
 Calibration FromTutti(const CalibrationDocument& file) {
-  const RunConfig config = ParseConfig(file.text, file.root.file().string());
+  const RunConfig config = ParseConfig(file.text, file.file().string());
   Calibration out;
   out.format = "tutti";
   if (config.dataset.camera) out.camera = *config.dataset.camera;
@@ -181,15 +180,15 @@ const Format kFormats[] = {
 Calibration Read(const CalibrationDocument& file) {
   if (!CamerasOfChain(file).empty()) return FromChain(file);
   for (const Format& format : kFormats) {
-    const KeyValue found = file.root.Find(format.keys);
+    const KeyValue found = file.Find(format.keys);
     if (found && (format.kind == Kind::kAny || found.node.IsMap())) return format.read(file);
   }
   if (IsTuttis(file)) return FromTutti(file);
   std::vector<Found> cameras;
   int most = 1000;
-  FindCameras(file, file.root.map(), "", 0, most, cameras);
+  FindCameras(file, file.map(), "", 0, most, cameras);
   if (cameras.empty())
-    throw InputError(file.root.file().string() + ": holds no calibration; " + kKnownCalibrations);
+    throw InputError(file.file().string() + ": holds no calibration; " + kKnownCalibrations);
   const Found& first = cameras.front();
   const CalibrationKeys keys = file.At(first.node);
   Calibration out = OneCamera(keys, NameOf(keys));

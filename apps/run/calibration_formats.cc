@@ -1,11 +1,10 @@
-#include "apps/run/calibration_formats.h"
-
+// Readers of the calibrations that SLAM and odometry programs write, one for each format.
 #include <Eigen/Geometry>
 
 #include <cmath>
 #include <tuple>
 
-#include "core/camera_text.h"
+#include "apps/run/calibration_keys.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -52,8 +51,8 @@ void TakeRawPairs(const RawCamera& left, const RawCamera& right, const std::stri
     const PinholeCamera raw_right = camera(right);
     if (!(baseline_m > 0))
       left.keys.Fail(left.keys.map(),
-                     "says how pairs are rectified, but not how far apart the cameras are "
-                     "(Camera.bf or focal_x_baseline)");
+                     "says how pairs are rectified, but not how far apart the cameras are (Camera.bf or "
+                     "focal_x_baseline)");
     Pose T;
     try {
       T = TransformOfRectified(R_left, R_right, baseline_m);
@@ -72,10 +71,10 @@ void TakeRawPairs(const RawCamera& left, const RawCamera& right, const std::stri
 Calibration OneOfSlam(const CalibrationDocument& file, const CalibrationKeys& keys,
                       const std::string& format) {
   Calibration out = OneCamera(keys, format);
-  const CalibrationKeys outside = file.root.Or(file["Preprocessing"]).Or(file.root.map(), "RGBD.");
+  const CalibrationKeys outside = file.Or(file["Preprocessing"]).Or(file.map(), "RGBD.");
   if (out.depth_units_per_m == 0)
     out.depth_units_per_m = outside.Number({"DepthMapFactor", "depthmap_factor"}).value_or(0);
-  out.baseline_m = file.root.Number({"Stereo.b"}).value_or(0);
+  out.baseline_m = file.Number({"Stereo.b"}).value_or(0);
   if (const std::optional<double> bf = keys.Number({"bf", "focal_x_baseline"});
       bf && out.baseline_m == 0 && out.camera.fx > 0)
     out.baseline_m = std::abs(*bf) / out.camera.fx;
@@ -119,10 +118,8 @@ void SetRight(const CalibrationKeys& keys, const PinholeCamera& right, const Pos
 }
 
 void CheckCalibrated(const fs::path& file, PinholeCamera camera, const char* which) {
-  if (camera.width == 0 || camera.height == 0) {  // of the images, later
-    camera.width = internal::PixelsOf(std::round(2 * std::max(1.0, camera.cx)));
-    camera.height = internal::PixelsOf(std::round(2 * std::max(1.0, camera.cy)));
-  }
+  if (camera.width == 0 || camera.height == 0)  // of the images, later
+    SetPixels(std::round(2 * std::max(1.0, camera.cx)), std::round(2 * std::max(1.0, camera.cy)), camera);
   const std::string problem = camera.Validate();
   if (!problem.empty()) throw InputError(file.string() + ": " + which + problem);
 }
@@ -155,7 +152,7 @@ Calibration FromChain(const CalibrationDocument& file) {
 }
 
 Calibration FromOrbSlam(const CalibrationDocument& file) {
-  const YAML::Node& root = file.root.map();
+  const YAML::Node& root = file.map();
   const bool three = file["Camera1.fx"].IsDefined();
   const CalibrationKeys flat = file.At(root, "Camera.");
   const CalibrationKeys left = three ? file.At(root, "Camera1.").Or(root, "Camera.") : flat;
@@ -168,12 +165,12 @@ Calibration FromOrbSlam(const CalibrationDocument& file) {
     TakeRawPairs({stella, "K_left", "D_left", "R_left"}, {stella, "K_right", "D_right", "R_right"},
                  stella.Word({"model"}), file.pairs, out);
   }
-  // Of the right camera in the left one's frame.
-  const KeyValue pose = file.root.Find({"Stereo.T_c1_c2", "Tlr"});
+  // The pose is that of the right camera in the left one's frame.
+  const KeyValue pose = file.Find({"Stereo.T_c1_c2", "Tlr"});
   const CalibrationKeys right = file.At(root, "Camera2.").Or(root, "Camera.");
   if (!file.pairs || out.right || !pose || !file["Camera2.fx"].IsDefined()) return out;
   std::string unused;
-  SetRight(right, CameraOfKeys(right, &unused), file.root.Transform(pose).Inverse(), out);
+  SetRight(right, CameraOfKeys(right, &unused), file.Transform(pose).Inverse(), out);
   return out;
 }
 
@@ -188,20 +185,19 @@ Calibration FromStella(const CalibrationDocument& file) {
 }
 
 Calibration FromVins(const CalibrationDocument& file) {
-  if (file["model_type"].IsDefined()) return OneCamera(file.root, "VINS");
+  if (file["model_type"].IsDefined()) return OneCamera(file, "VINS");
   const auto read = [&](const char* key) {
-    const std::string name = file.root.Word({key});
-    const fs::path beside = file.root.file().parent_path() / name;
+    const std::string name = file.Word({key});
+    const fs::path beside = file.file().parent_path() / name;
     Calibration out =
-        OneCamera(ParseCalibration(beside, ReadCalibrationText(beside), false).root, "VINS, " + name);
+        OneCamera(ParseCalibration(beside, ReadCalibrationText(beside), false), "VINS, " + name);
     CheckCalibrated(beside, out.camera);
     return out;
   };
   Calibration out = read("cam0_calib");
-  const KeyValue left = file.root.Find({"body_T_cam0"}), right = file.root.Find({"body_T_cam1"});
+  const KeyValue left = file.Find({"body_T_cam0"}), right = file.Find({"body_T_cam1"});
   if (file.pairs && left && right && file["cam1_calib"].IsDefined())
-    SetRight(file.root, read("cam1_calib").camera,
-             file.root.Transform(right).Inverse() * file.root.Transform(left), out);
+    SetRight(file, read("cam1_calib").camera, file.Transform(right).Inverse() * file.Transform(left), out);
   return out;
 }
 
@@ -211,14 +207,13 @@ Calibration FromBasalt(const CalibrationDocument& file) {
   const auto element = [&](const char* name, std::size_t i) {
     const YAML::Node list = value[name];
     if (!list.IsDefined() || !list.IsSequence() || i >= list.size())
-      file.root.Fail(value, std::string("value0 has no '") + name + "' of camera " + std::to_string(i));
+      file.Fail(value, std::string("value0 has no '") + name + "' of camera " + std::to_string(i));
     return list[i];
   };
   const auto camera = [&](std::size_t i) {
     Calibration out = OneCamera(file.At(element("intrinsics", i)), "Basalt");
-    const auto size = file.root.Array<2>({element("resolution", i), "resolution"});
-    out.camera.width = internal::PixelsOf(size[0]);
-    out.camera.height = internal::PixelsOf(size[1]);
+    const auto size = file.Array<2>({element("resolution", i), "resolution"});
+    SetPixels(size[0], size[1], out.camera);
     return out;
   };
   Calibration out = camera(0);
@@ -227,7 +222,7 @@ Calibration FromBasalt(const CalibrationDocument& file) {
   if (file.pairs && count > 1) {
     const Pose left = PoseOfBasalt(file.At(element("T_imu_cam", 0)));
     const Pose right = PoseOfBasalt(file.At(element("T_imu_cam", 1)));
-    SetRight(file.root, camera(1).camera, right.Inverse() * left, out);
+    SetRight(file, camera(1).camera, right.Inverse() * left, out);
   }
   return out;
 }

@@ -6,7 +6,6 @@
 #include <sstream>
 #include <utility>
 
-#include "apps/run/calibration_formats.h"
 #include "core/camera_text.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
@@ -80,14 +79,6 @@ CalibrationKeys WithParts(const CalibrationKeys& keys) {
 }
 
 PinholeCamera IntrinsicsOf(const CalibrationKeys& keys) {
-  PinholeCamera camera;
-  const auto set = [&](double fx, double fy, double cx, double cy) {
-    camera.fx = fx;
-    camera.fy = fy;
-    camera.cx = cx;
-    camera.cy = cy;
-    return camera;
-  };
   KeyValue list = keys.Find(kMatrix);
   if (IsList(list)) return CameraOfMatrix(keys, list);
   list = keys.Find(kIntrinsics);
@@ -95,30 +86,27 @@ PinholeCamera IntrinsicsOf(const CalibrationKeys& keys) {
     const std::vector<double> v = keys.Numbers(list);
     if (v.size() == 9 || v.size() == 16) return CameraOfMatrix(keys, list);
     if (v.size() != 4) keys.FailSize(list, v.size(), "4 are needed: fx, fy, cx, cy");
-    if (keys.Has("sensor_name") && list.node.IsMap()) return set(v[0], v[2], v[1], v[3]);  // OpenLORIS
-    return set(v[0], v[1], v[2], v[3]);
+    if (keys.Has("sensor_name") && list.node.IsMap()) return Intrinsics(v[0], v[2], v[1], v[3]);  // OpenLORIS
+    return Intrinsics(v[0], v[1], v[2], v[3]);
   }
   if (keys.Has("focal_length") && keys.Has("principal_point")) {  // OKVIS
     const auto focal = keys.Array<2>(keys.Find({"focal_length"}));
     const auto centre = keys.Array<2>(keys.Find({"principal_point"}));
-    return set(focal[0], focal[1], centre[0], centre[1]);
+    return Intrinsics(focal[0], focal[1], centre[0], centre[1]);
   }
-  return set(keys.Needed(kFx), keys.Needed(kFy), keys.Needed(kCx), keys.Needed(kCy));
+  return Intrinsics(keys.Needed(kFx), keys.Needed(kFy), keys.Needed(kCx), keys.Needed(kCy));
 }
 
 void SetSize(const CalibrationKeys& keys, PinholeCamera& camera) {
   if (const KeyValue size = keys.Find(kSize)) {
     const auto values = keys.Array<2>(size);
-    camera.width = internal::PixelsOf(values[0]);
-    camera.height = internal::PixelsOf(values[1]);
-    return;
+    return SetPixels(values[0], values[1], camera);
   }
   const std::optional<double> width = keys.Number(kWidth), height = keys.Number(kHeight);
   if (width.has_value() != height.has_value())
     keys.Fail(keys.map(),
               std::string("has an image ") + (width ? "width, but no height" : "height, but no width"));
-  camera.width = internal::PixelsOf(width.value_or(0));
-  camera.height = internal::PixelsOf(height.value_or(0));
+  SetPixels(width.value_or(0), height.value_or(0), camera);
 }
 
 // k1, k2, ... under their own names, in the order of the lens.
@@ -138,10 +126,10 @@ std::vector<double> NamedTerms(const CalibrationKeys& keys, const std::string& l
     const auto used = std::find_if(names.begin(), names.end(),
                                    [&](const char* known) { return std::string(known) == name; });
     if (used == names.end() && keys.Number({name}).value_or(0) != 0)
-      keys.Fail(keys.Find({name}).node, std::string("'") + name + "' is not 0, but the lens" +
-                                            (lens.empty() ? "" : " '" + lens + "'") +
-                                            " has no such coefficient; tutti has radtan (k1 k2 p1 p2 k3) and "
-                                            "equidistant (k1 k2 k3 k4)");
+      keys.Fail(
+          keys.Find({name}).node,
+          std::string("'") + name + "' is not 0, but the lens" + (lens.empty() ? "" : " '" + lens + "'") +
+              " has no such coefficient; tutti has radtan (k1 k2 p1 p2 k3) and equidistant (k1 k2 k3 k4)");
   }
   return any ? values : std::vector<double>();
 }
@@ -326,16 +314,25 @@ PinholeCamera CameraOfMatrix(const CalibrationKeys& keys, const KeyValue& matrix
   const std::size_t columns = v.size() == 9 ? 3 : 4;
   const auto at = [&](std::size_t row, std::size_t column) { return v[row * columns + column]; };
   const bool by_columns = at(2, 0) != 0 || at(2, 1) != 0;  // Open3D
-  PinholeCamera camera;
-  camera.fx = at(0, 0);
-  camera.fy = at(1, 1);
-  camera.cx = by_columns ? at(2, 0) : at(0, 2);
-  camera.cy = by_columns ? at(2, 1) : at(1, 2);
   if (at(0, 1) != 0 || at(1, 0) != 0 || at(2, 2) != 1 || (by_columns && (at(0, 2) != 0 || at(1, 2) != 0)))
     keys.Fail(matrix.node, "'" + matrix.key +
                                "' is no camera matrix that tutti has (fx, 0, cx; 0, fy, cy; 0, 0, 1): its "
                                "pixels are skewed, or its values in another order");
+  return Intrinsics(at(0, 0), at(1, 1), by_columns ? at(2, 0) : at(0, 2), by_columns ? at(2, 1) : at(1, 2));
+}
+
+PinholeCamera Intrinsics(double fx, double fy, double cx, double cy) {
+  PinholeCamera camera;
+  camera.fx = fx;
+  camera.fy = fy;
+  camera.cx = cx;
+  camera.cy = cy;
   return camera;
+}
+
+void SetPixels(double width, double height, PinholeCamera& camera) {
+  camera.width = internal::PixelsOf(width);
+  camera.height = internal::PixelsOf(height);
 }
 
 std::string LensName(const CalibrationKeys& keys) {

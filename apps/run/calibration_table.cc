@@ -1,5 +1,4 @@
-#include "apps/run/calibration_table.h"
-
+// Calibrations as tables of words and numbers, not keys: COLMAP, DSO, ETH3D and others.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -8,6 +7,7 @@
 #include <sstream>
 #include <vector>
 
+#include "apps/run/calibration_keys.h"
 #include "core/camera_text.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -106,12 +106,11 @@ Calibration FromColmap(const CalibrationTable& table) {
                          std::to_string(model->second.parameters.size()) + " are needed");
   std::map<std::string, double> named;
   for (std::size_t i = 0; i < values.size(); ++i) named[model->second.parameters[i]] = values[i];
-  out.camera.width = internal::PixelsOf(size[0]);
-  out.camera.height = internal::PixelsOf(size[1]);
-  out.camera.fx = named.count("f") != 0 ? named["f"] : named["fx"];
-  out.camera.fy = named.count("f") != 0 ? named["f"] : named["fy"];
-  out.camera.cx = named["cx"] - 0.5;  // COLMAP's (0, 0) is the corner of the first pixel, not its centre
-  out.camera.cy = named["cy"] - 0.5;
+  const bool one = named.count("f") != 0;
+  // COLMAP's (0, 0) is the corner of the first pixel, not its centre.
+  out.camera =
+      Intrinsics(named[one ? "f" : "fx"], named[one ? "f" : "fy"], named["cx"] - 0.5, named["cy"] - 0.5);
+  SetPixels(size[0], size[1], out.camera);
   const std::string lens = model->second.lens;
   const bool fisheye = lens == "fisheye";
   std::vector<double> terms;
@@ -127,7 +126,7 @@ Calibration FromColmap(const CalibrationTable& table) {
 // "Intrinsic of "Color" / 640x480 / {RGB8}", then a line for each value.
 std::optional<Calibration> FromRealSense(const CalibrationTable& table) {
   constexpr std::array<const char*, 8> kNames = {
-      "Width:", "Height:", "PPX:", "PPY:", "Fx:", "Fy:", "Distortion:", "Coeffs:"};
+      "Width:", "Height:", "Fx:", "Fy:", "PPX:", "PPY:", "Distortion:", "Coeffs:"};
   std::map<std::string, TableLine> values;
   for (const TableLine& line : table.lines) {
     const std::string& key = line.words[0];
@@ -146,12 +145,10 @@ std::optional<Calibration> FromRealSense(const CalibrationTable& table) {
   };
   Calibration out;
   out.format = "RealSense";
-  out.camera.width = internal::PixelsOf(number("Width:"));
-  out.camera.height = internal::PixelsOf(number("Height:"));
-  out.camera.fx = number("Fx:");
-  out.camera.fy = number("Fy:");
-  out.camera.cx = number("PPX:");
-  out.camera.cy = number("PPY:");
+  std::array<double, 6> v{};
+  std::transform(kNames.begin(), kNames.begin() + v.size(), v.begin(), number);
+  out.camera = Intrinsics(v[2], v[3], v[4], v[5]);
+  SetPixels(v[0], v[1], out.camera);
   if (const auto lens = values.find("Distortion:"); lens != values.end()) {
     const std::vector<std::string>& words = lens->second.words;
     const auto terms = values.find("Coeffs:");
@@ -178,16 +175,12 @@ Calibration FromDso(const CalibrationTable& table) {
     table.Fail(line, "has " + std::to_string(v.size()) + " numbers; 5 or 8 are needed");
   Calibration out;
   out.format = "DSO";
-  PinholeCamera& camera = out.camera;
-  camera.width = internal::PixelsOf(size[0]);
-  camera.height = internal::PixelsOf(size[1]);
   constexpr double kLongestFraction = 10;
-  const bool fraction = v[0] < kLongestFraction && v[1] < kLongestFraction;
-  camera.fx = fraction ? v[0] * size[0] : v[0];
-  camera.fy = fraction ? v[1] * size[1] : v[1];
-  camera.cx = fraction ? v[2] * size[0] - 0.5 : v[2];
-  camera.cy = fraction ? v[3] * size[1] - 0.5 : v[3];
-  table.Set(line, named ? line.words[0] : "FOV", {v.begin() + 4, v.end()}, camera);
+  out.camera = v[0] < kLongestFraction && v[1] < kLongestFraction
+                   ? Intrinsics(v[0] * size[0], v[1] * size[1], v[2] * size[0] - 0.5, v[3] * size[1] - 0.5)
+                   : Intrinsics(v[0], v[1], v[2], v[3]);
+  SetPixels(size[0], size[1], out.camera);
+  table.Set(line, named ? line.words[0] : "FOV", {v.begin() + 4, v.end()}, out.camera);
   return out;
 }
 
@@ -201,28 +194,21 @@ bool IsMatrix(const CalibrationTable& table, const std::vector<double>& v) {
 Calibration FromNumbers(const CalibrationTable& table, const std::vector<double>& v) {
   const TableLine& line = table.lines.front();
   Calibration out;
-  PinholeCamera& camera = out.camera;
-  const auto set = [&](double fx, double fy, double cx, double cy) {
-    camera.fx = fx;
-    camera.fy = fy;
-    camera.cx = cx;
-    camera.cy = cy;
-  };
   if (IsMatrix(table, v)) {
     out.format = "a camera matrix";
     const std::size_t columns = v.size() == 9 ? 3 : 4;
     if (v[1] != 0 || v[columns] != 0 || v[2 * columns] != 0 || v[2 * columns + 1] != 0 ||
         v[2 * columns + 2] != 1)
       table.Fail(line, "is no camera matrix that tutti has (fx 0 cx, 0 fy cy, 0 0 1)");
-    set(v[0], v[columns + 1], v[2], v[columns + 2]);
+    out.camera = Intrinsics(v[0], v[columns + 1], v[2], v[columns + 2]);
     return out;
   }
   out.format = "fx fy cx cy";
   if (table.lines.size() > 1 || (v.size() != 4 && v.size() != 8 && v.size() != 9))
     table.Fail(line, "has " + std::to_string(v.size()) + " numbers; " + internal::kCameraText +
                          " on one line, or a camera matrix, are needed");
-  set(v[0], v[1], v[2], v[3]);
-  table.Set(line, "radtan", {v.begin() + 4, v.end()}, camera);
+  out.camera = Intrinsics(v[0], v[1], v[2], v[3]);
+  table.Set(line, "radtan", {v.begin() + 4, v.end()}, out.camera);
   if (v.size() > 4) out.format += " k1 k2 p1 p2";
   return out;
 }

@@ -14,7 +14,7 @@
 
 #include "apps/run/map_figures.h"
 #include "apps/run/run_parts.h"
-#include "frontend/dataset/wrapped_dataset.h"
+#include "frontend/dataset/turned_dataset.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {
@@ -138,22 +138,23 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
   return {summary.IsSolutionUsable(), summary.final_cost, summary.num_residuals_reduced};
 }
 
-// So many in a row between which the camera turns most.
-std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& keyframes, std::size_t most) {
-  if (keyframes.size() <= most) return keyframes;
+// Keyframes in a row between which the camera turns most.
+std::vector<int> WhereItTurns(const Odometry& odometry, const FrameRange& session) {
+  const std::vector<int> keyframes = KeyframesOfLargestSubmap(odometry, session);
+  if (keyframes.size() <= kCheckedKeyframes) return keyframes;
   std::vector<double> turned = {0};  // up to each keyframe
   for (std::size_t k = 1; k < keyframes.size(); ++k) {
-    const Pose before = odometry.map().keyframe(keyframes[k - 1]).T_world_camera,
-               here = odometry.map().keyframe(keyframes[k]).T_world_camera;
+    const Pose& before = odometry.map().keyframe(keyframes[k - 1]).T_world_camera;
+    const Pose& here = odometry.map().keyframe(keyframes[k]).T_world_camera;
     turned.push_back(turned.back() + (before.Inverse() * here).Angle());
   }
   std::size_t best = 0;
-  const auto turn = [&](std::size_t begin) { return turned[begin + most - 1] - turned[begin]; };
-  for (std::size_t begin = 1; begin + most <= keyframes.size(); ++begin) {
+  const auto turn = [&](std::size_t begin) { return turned[begin + kCheckedKeyframes - 1] - turned[begin]; };
+  for (std::size_t begin = 1; begin + kCheckedKeyframes <= keyframes.size(); ++begin) {
     if (turn(begin) > turn(best)) best = begin;
   }
   const auto first = keyframes.begin() + static_cast<std::ptrdiff_t>(best);
-  return {first, first + static_cast<std::ptrdiff_t>(most)};
+  return {first, first + static_cast<std::ptrdiff_t>(kCheckedKeyframes)};
 }
 
 // Landmarks that three of the keyframes see, those seen most first. `aspect`: fy over fx, by which offsets
@@ -240,7 +241,7 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
   return pass;
 }
 
-// Of a residual, which would be 1 if sigmas were as they are said to be.
+// The variance of a residual would be 1 if sigmas were what they are said to be.
 double VarianceOf(const Scene& scene, const Fit& fit) {
   const auto free = static_cast<double>(6 * scene.cameras.size() + 3 * scene.landmarks.size());
   return std::max(1e-4, 2 * fit.cost / std::max(1.0, fit.residuals - free));
@@ -367,9 +368,8 @@ FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session, d
   const double cpu_begin = ProcessCpuSeconds();
   FocalLength result;
   result.camera = odometry.map().rig().camera;
-  const std::optional<Scene> scene = SceneOf(
-      odometry, WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes),
-      kCheckedLandmarks, result.camera.fy / result.camera.fx);
+  const std::optional<Scene> scene = SceneOf(odometry, WhereItTurns(odometry, session), kCheckedLandmarks,
+                                             result.camera.fy / result.camera.fx);
   const std::optional<Estimate> found = scene ? EstimateOf(*scene, kAnyMove) : std::nullopt;
   if (found && IsLens(std::exp(found->lens[0]), result.camera.width)) {
     result.sigma = std::hypot(found->sigma, lens_sigma);
@@ -387,9 +387,7 @@ FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session, d
 
 LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
   LensCheck check;
-  const std::vector<int> keyframes =
-      WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes);
-  std::optional<Scene> scene = SceneOf(odometry, keyframes, kCheckedLandmarks);
+  std::optional<Scene> scene = SceneOf(odometry, WhereItTurns(odometry, session), kCheckedLandmarks);
   if (!scene) return check;
   // A wrong focal length and a wrong lens look nearly the same, and seldom are both wrong.
   Scene kept = *scene;

@@ -32,7 +32,7 @@ struct FocalLength {
 FocalLength MeasureFocalLength(const std::filesystem::path& dataset, const RunConfig& config,
                                int frames = 300);
 
-/// The same bundle adjustments on the map of a run, 40 keyframes in a row where its camera turns most,
+/// Makes these bundle adjustments on the map of a run, 40 keyframes in a row where its camera turns most,
 /// without tracking anything again. `camera`: the odometry's with another focal length. `lens_sigma`: of what
 /// was measured before, if its distortion was taken out of the images.
 FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session = {}, double lens_sigma = 0);

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <utility>
 
-#include "apps/run/depth_beside.h"
+#include "frontend/dataset/depth_reader.h"
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/layout.h"
+#include "frontend/dataset/wrapped_dataset.h"
+#include "frontend/features/rectifier.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
@@ -19,35 +21,130 @@ namespace fs = std::filesystem;
 constexpr double kLongestGap = 1.0;  // between poses that are interpolated [s]
 constexpr double kSameTime = 0.02;   // of a pose and an image [s]
 
-/// A data set with other time stamps.
-class RestampedDataset : public Dataset {
+/// A data set that says in part something else than the one that it has.
+class DatasetAround : public Dataset {
  public:
-  RestampedDataset(std::unique_ptr<Dataset> images, std::vector<double> stamps)
-      : images_(std::move(images)), stamps_(std::move(stamps)) {}
+  explicit DatasetAround(std::unique_ptr<Dataset> images) : images_(std::move(images)) {}
 
   Supply FrameSupply() const override { return images_->FrameSupply(); }
   std::size_t Size() const override { return images_->Size(); }
-  double Stamp(std::size_t i) const override { return stamps_.at(static_cast<std::size_t>(Number(i))); }
+  double Stamp(std::size_t i) const override { return images_->Stamp(i); }
   std::int64_t Number(std::size_t i) const override { return images_->Number(i); }
-  ReadResult Read(std::size_t i) const override {
-    ReadResult read = images_->Read(i);
-    if (read.frame) read.frame->stamp_s = Stamp(i);
-    return read;
-  }
   ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
   double SkippedShare() const override { return images_->SkippedShare(); }
   const CameraRig& Rig() const override { return images_->Rig(); }
   std::optional<fs::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
+    return images_->ReadGroundTruth(file, warnings);
+  }
+  const std::vector<std::string>& Warnings() const override { return images_->Warnings(); }
+
+ protected:
+  std::unique_ptr<Dataset> images_;
+};
+
+/// Other time stamps.
+class RestampedDataset : public DatasetAround {
+ public:
+  RestampedDataset(std::unique_ptr<Dataset> images, std::vector<double> stamps)
+      : DatasetAround(std::move(images)), stamps_(std::move(stamps)) {}
+
+  double Stamp(std::size_t i) const override { return stamps_.at(static_cast<std::size_t>(Number(i))); }
+  ReadResult Read(std::size_t i) const override {
+    ReadResult read = images_->Read(i);
+    if (read.frame) read.frame->stamp_s = Stamp(i);
+    return read;
+  }
+  Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
     const PoseFile read = ReadPoseFile(file);
     if (read.has_stamps) return images_->ReadGroundTruth(file, warnings);
     return ReadPoseFile(file, read.format, stamps_).trajectory;
   }
-  const std::vector<std::string>& Warnings() const override { return images_->Warnings(); }
 
  private:
-  std::unique_ptr<Dataset> images_;
   std::vector<double> stamps_;
+};
+
+/// One camera's images with registered depth that lies in a folder of its own: an RGB-D data set.
+class DepthBeside : public DatasetAround {
+ public:
+  /// `stamps`: of all images of the folder, whatever part of them `images` has. Depth images are
+  /// paired in the order of their names if there are as many, else by the stamps that they are called by
+  /// (max_association_s). Throws InputError if neither works.
+  DepthBeside(std::unique_ptr<Dataset> images, const std::vector<double>& stamps, const fs::path& depth,
+              const DatasetOptions& options)
+      : DatasetAround(std::move(images)),
+        options_(options),
+        rig_(images_->Rig()),
+        warnings_(images_->Warnings()) {
+    rig_.sensor = Sensor::kRgbd;
+    rig_.max_depth_m = options.max_depth_m;
+    if (options.camera && options.camera->distortion != Distortion::kNone) {
+      const PinholeCamera stored = TurnedCamera(rig_.camera, (360 - options.rotate) % 360);
+      PinholeCamera camera = *options.camera;  // of the images' size, as OpenDataset has checked
+      camera.width = stored.width;
+      camera.height = stored.height;
+      rectifier_.emplace(camera);
+    }
+    std::vector<fs::path> found;
+    for (RoleImage& image : ImagesOf(depth, {""})) found.push_back(std::move(image.file));
+    if (found.empty()) throw InputError(depth.string() + ": holds no depth image (--depth)");
+    const bool upright = options.rotate % 180 == 0;
+    const cv::Size turned(rig_.camera.width, rig_.camera.height);
+    reader_.emplace(options, DepthFormat(), options.camera,
+                    upright ? turned : cv::Size(turned.height, turned.width));
+    for (std::string& note : reader_->Notes(found.front())) warnings_.push_back(std::move(note));
+    if (found.size() == stamps.size()) {
+      files_ = found;
+      return;
+    }
+    const auto named = StampsInNames(found).stamps;
+    files_.resize(stamps.size());
+    std::size_t alone = stamps.size();
+    for (std::size_t i = 0; i < stamps.size() && !named.empty(); ++i) {
+      const auto later = std::lower_bound(named.begin(), named.end(), stamps[i],
+                                          [](const auto& stamp, double s) { return stamp.first < s; });
+      auto nearest = later;
+      if (later == named.end() ||
+          (later != named.begin() && stamps[i] - (later - 1)->first < later->first - stamps[i]))
+        nearest = later - 1;
+      if (std::abs(nearest->first - stamps[i]) > options.max_association_s) continue;
+      files_[i] = found[nearest->second];
+      --alone;
+    }
+    if (alone == stamps.size())
+      throw InputError(
+          depth.string() + ": has " + std::to_string(found.size()) + " depth images for " +
+          std::to_string(stamps.size()) +
+          " images, and their names are no time stamps near those of the images; give as many, or "
+          "name them by their time");
+    if (alone > 0)
+      warnings_.push_back(depth.string() + ": " + std::to_string(alone) + " of " +
+                          std::to_string(stamps.size()) + " images have no depth image within " +
+                          std::to_string(options.max_association_s) + " s");
+  }
+
+  /// With depth, or with depth_error.
+  ReadResult Read(std::size_t i) const override {
+    ReadResult result = images_->Read(i);
+    if (!result.frame) return result;
+    const fs::path& file = files_.at(static_cast<std::size_t>(Number(i)));
+    if (file.empty()) return result;
+    cv::Mat metres;
+    result.depth_error = reader_->Read(file, rectifier_, metres);
+    if (result.depth_error.empty()) result.frame->depth_m = TurnedImage(metres, options_.rotate);
+    return result;
+  }
+  const CameraRig& Rig() const override { return rig_; }
+  const std::vector<std::string>& Warnings() const override { return warnings_; }
+
+ private:
+  DatasetOptions options_;
+  CameraRig rig_;
+  std::optional<Rectifier> rectifier_;  // of a camera with distortion
+  std::optional<DepthReader> reader_;
+  std::vector<fs::path> files_;  // of each image; empty: none
+  std::vector<std::string> warnings_;
 };
 
 // All images, whatever part of them is to be used.
@@ -66,6 +163,11 @@ bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
 
 bool Grows(const std::vector<double>& stamps) {
   return std::adjacent_find(stamps.begin(), stamps.end(), std::greater_equal<>()) == stamps.end();
+}
+
+Trajectory::const_iterator NotBefore(const Trajectory& trajectory, double stamp_s) {
+  return std::lower_bound(trajectory.begin(), trajectory.end(), stamp_s,
+                          [](const StampedPose& pose, double s) { return pose.stamp_s < s; });
 }
 
 PoseFile ReadPoses(const GivenOdometryFiles& files, const std::vector<double>& times) {
@@ -129,7 +231,12 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   }
   as_given_ = trajectory_;
   trajectory_ = WithoutOutliers(std::move(trajectory_), jumps_);
-  SumUp(files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas);
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const MotionSigma& sigma :
+       files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas) {
+    if (!variances_.empty()) sum += Eigen::Vector2d(sigma.translation_m, sigma.rotation_rad).cwiseAbs2();
+    variances_.push_back(sum);
+  }
 }
 
 // Lines have no stamps: one for each image, in order, or the images that they number.
@@ -153,17 +260,8 @@ void GivenOdometry::StampByOrder(bool numbered, const Dataset& all) {
   for (std::size_t i = 0; i < trajectory_.size(); ++i) trajectory_[i].stamp_s = stamp(i);
 }
 
-void GivenOdometry::SumUp(const std::vector<MotionSigma>& sigmas) {
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (std::size_t i = 0; i < sigmas.size(); ++i) {
-    if (i > 0) sum += Eigen::Vector2d(sigmas[i].translation_m, sigmas[i].rotation_rad).cwiseAbs2();
-    variances_.push_back(sum);
-  }
-}
-
 Eigen::Vector2d GivenOdometry::Variance(double stamp_s) const {
-  const auto later = std::lower_bound(trajectory_.begin(), trajectory_.end(), stamp_s,
-                                      [](const StampedPose& p, double s) { return p.stamp_s < s; });
+  const auto later = NotBefore(trajectory_, stamp_s);
   if (later == trajectory_.begin()) return variances_.front();
   if (later == trajectory_.end()) return variances_.back();
   const auto i = static_cast<std::size_t>(later - trajectory_.begin());
@@ -233,8 +331,7 @@ std::unique_ptr<Dataset> GivenOdometry::Open() const {
 }
 
 std::optional<Pose> GivenOdometry::At(double stamp_s) const {
-  const auto later = std::lower_bound(trajectory_.begin(), trajectory_.end(), stamp_s,
-                                      [](const StampedPose& p, double s) { return p.stamp_s < s; });
+  const auto later = NotBefore(trajectory_, stamp_s);
   if (later != trajectory_.end() && later->stamp_s - stamp_s < 1e-6) return later->pose;
   if (auto pose = InterpolatePose(trajectory_, stamp_s, kLongestGap)) return pose;
   auto nearest = later;

@@ -38,7 +38,7 @@ class GivenOdometry {
   /// How uncertain the motion from the one time to the other is, as far as the files say: in the trajectory's
   /// own columns or a file beside it. Within a motion the variance grows evenly.
   std::optional<MotionSigma> SigmaBetween(double from_s, double to_s) const;
-  /// As the file has it.
+  /// The poses that the file has, outliers among them.
   const Trajectory& trajectory() const { return as_given_; }
   /// Its jumps, in order of time.
   const std::vector<OdometryJump>& jumps() const { return jumps_; }
@@ -48,7 +48,6 @@ class GivenOdometry {
  private:
   std::vector<double> ImageStamps(const Dataset& all, bool numbered);
   void StampByOrder(bool numbered, const Dataset& all);
-  void SumUp(const std::vector<MotionSigma>& sigmas);
   Eigen::Vector2d Variance(double stamp_s) const;
 
   GivenOdometryFiles files_;

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <csignal>
+#include <cstddef>
 
 namespace tutti {
 
@@ -12,16 +14,35 @@ namespace tutti {
 /// times. SIGPIPE is ignored: a run outlives the one who reads its messages. One at a time.
 class InterruptGuard {
  public:
-  InterruptGuard();
-  ~InterruptGuard();
+  InterruptGuard() {
+    requested_ = false;
+    for (std::size_t i = 0; i < kSignals.size(); ++i) {
+      const int signal = kSignals[i];
+      sigaction(signal, nullptr, &old_[i]);
+      if (signal == SIGHUP && old_[i].sa_handler == SIG_IGN) continue;  // nohup
+      struct sigaction action = {};
+      action.sa_handler = signal == SIGPIPE ? SIG_IGN : [](int) { requested_ = true; };
+      // The second one ends the process.
+      if (signal == SIGINT || signal == SIGTERM || signal == SIGQUIT)
+        action.sa_flags = static_cast<int>(SA_RESETHAND);
+      sigemptyset(&action.sa_mask);
+      sigaction(signal, &action, nullptr);
+    }
+  }
+  ~InterruptGuard() {
+    for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &old_[i], nullptr);
+  }
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  static bool Requested();
+  static bool Requested() { return requested_; }
 
  private:
   static constexpr std::array<int, 7> kSignals = {SIGINT,  SIGTERM, SIGQUIT, SIGHUP,
                                                   SIGXFSZ, SIGXCPU, SIGPIPE};
+  // A signal handler can reach nothing but a global. Any thread may be the one that is interrupted.
+  static inline std::atomic<bool> requested_ = false;
+  static_assert(std::atomic<bool>::is_always_lock_free);
   std::array<struct sigaction, kSignals.size()> old_ = {};
 };
 

@@ -64,11 +64,6 @@ std::string FramesCsv(const Localization& localization) {
       "frame,stamp_s,state,recognised,keyframe,inliers,position_sigma_m,rotation_sigma_deg,reason\n";
   for (const LocalizedFrame& frame : localization.frames) {
     const bool posed = frame.track.state == TrackingState::kTracking;
-    double position = NAN, rotation = NAN;
-    if (frame.covariance) {
-      position = std::sqrt(frame.covariance->topLeftCorner<3, 3>().trace());
-      rotation = std::sqrt(frame.covariance->bottomRightCorner<3, 3>().trace()) / internal::kRadians;
-    }
     char line[256];
     std::snprintf(line, sizeof line, "%lld,%.6f,%s,%d,%d,%d,", static_cast<long long>(frame.index),
                   frame.stamp_s,
@@ -77,13 +72,12 @@ std::string FramesCsv(const Localization& localization) {
                                  : "localized",
                   frame.recognised ? 1 : 0, frame.keyframe, frame.track.inliers);
     csv += line;
-    if (frame.covariance) {
-      std::snprintf(line, sizeof line, "%.6g,%.6g", position, rotation);
-      csv += line;
-    } else {
-      csv += ",";
-    }
-    csv += ",\"" + frame.track.reason + "\"\n";
+    std::snprintf(line, sizeof line, ",");
+    if (frame.covariance)
+      std::snprintf(line, sizeof line, "%.6g,%.6g",
+                    std::sqrt(frame.covariance->topLeftCorner<3, 3>().trace()),
+                    std::sqrt(frame.covariance->bottomRightCorner<3, 3>().trace()) / internal::kRadians);
+    csv += line + (",\"" + frame.track.reason) + "\"\n";
   }
   return csv;
 }
@@ -110,13 +104,9 @@ std::string Summary(const LocalizationRequest& request, const Localization& l) {
 std::vector<PlotSeries> MapSeries(const RunState& state) {
   const std::size_t count = state.sessions.size();
   std::vector<PlotSeries> series(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    if (count == 1) {
-      series[k] = {"map", {}, "#999999", 2.5, false};
-    } else {
-      series[k] = {"session " + std::to_string(k + 1), {}, SessionColor(k), 2.5, false};
-    }
-  }
+  for (std::size_t k = 0; k < count; ++k)
+    series[k] = {"session " + std::to_string(k + 1), {}, SessionColor(k), 2.5, false};
+  if (count == 1) series[0] = {"map", {}, "#999999", 2.5, false};
   std::vector<int> pieces(count, -1);
   for (const int id : state.odometry->map().KeyframeIds()) {
     if (id >= state.end_of_map) break;
@@ -151,12 +141,6 @@ TrajectoryPlot Picture(const LocalizationRequest& request, const RunState& state
   return plot;
 }
 
-std::unique_ptr<SlamSystem> OpenMap(const LocalizationRequest& request, MapInfo info) {
-  info.config.run.threads = request.threads;
-  return LoadMap(request.map, info);
-}
-
-// Of the map that is located in.
 RunState StateIn(const SlamSystem& slam, const Localizer& localizer) {
   RunState state = {&localizer.odometry(), slam.loops()};
   state.sessions.clear();
@@ -220,7 +204,7 @@ Localization Localize(const LocalizationRequest& request) {
   cv::setNumThreads(1);
   const OutputLayout layout = {IsLocalization, kSummary, "version", {}, nullptr};
   OutputFolder::Check(request.out, layout);
-  const MapInfo info = ReadMapInfo(request.map);
+  MapInfo info = ReadMapInfo(request.map);
   const DatasetOptions options = Reading(request, info);
   const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, options);
   CheckRig(request, info.rig, dataset->Rig());
@@ -229,7 +213,8 @@ Localization Localize(const LocalizationRequest& request) {
   OutputFolder folder(request.out, layout);
   Localization result;
   result.masked = !options.mask.empty();
-  const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);
+  info.config.run.threads = request.threads;
+  const std::unique_ptr<SlamSystem> slam = LoadMap(request.map, info);
   Localizer localizer(*slam);
   result.load_s = since.Seconds();
   result.map_keyframes = localizer.map_keyframes();
@@ -238,13 +223,11 @@ Localization Localize(const LocalizationRequest& request) {
   LocateAll(request, *dataset, since, *slam, localizer, result);
   result.wall_s = watch.Seconds();
   result.cpu_s = ProcessCpuSeconds() - cpu;
-  folder.Write({kTrajectory, [&](const fs::path& file) {
-                  WriteTrajectory(file, result.trajectory, TrajectoryFormat::kTum);
-                }});
+  const TrajectoryFormat tum = TrajectoryFormat::kTum;
+  const RunState state = StateIn(*slam, localizer);
+  folder.Write({kTrajectory, [&](const fs::path& file) { WriteTrajectory(file, result.trajectory, tum); }});
   folder.Write({kFrames, [&](const fs::path& file) { internal::WriteFile(file, FramesCsv(result)); }});
-  folder.Write({kPicture, [&](const fs::path& file) {
-                  WriteSvg(file, Picture(request, StateIn(*slam, localizer), result));
-                }});
+  folder.Write({kPicture, [&](const fs::path& file) { WriteSvg(file, Picture(request, state, result)); }});
   folder.Write(
       {kSummary, [&](const fs::path& file) { internal::WriteFile(file, Summary(request, result)); }});
   ThrowFailures(folder.failures(), folder.Finish(!result.interrupted));

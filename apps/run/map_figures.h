@@ -13,7 +13,7 @@ namespace tutti {
 /// pose.
 std::vector<int> KeyframesOfLargestSubmap(const Odometry& odometry, const FrameRange& session);
 
-/// Of the largest submap; zeros where it has no keyframe.
+/// Figures of the largest submap; they are zeros where it has no keyframe.
 struct MapFigures {
   int keyframes = 0;
   double landmarks = 0;    ///< that a keyframe sees, median

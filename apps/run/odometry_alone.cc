@@ -1,42 +1,31 @@
 #include "apps/run/odometry_alone.h"
 
+#include <chrono>
+#include <utility>
+
 #include "tutti/core/span_recorder.h"
 
 namespace tutti {
 
 // Mapping stays on the thread that tracks: its time is what this costs.
 OdometryAlone::OdometryAlone(const Odometry& odometry, std::int64_t last, bool own_thread)
-    : odometry_(odometry, Execution{false, nullptr}), last_(last) {
-  if (own_thread) thread_ = std::thread(&OdometryAlone::Work, this);
-}
+    : odometry_(odometry, Execution{false, nullptr}), last_(last), own_thread_(own_thread) {}
 
-OdometryAlone::~OdometryAlone() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    stop_ = true;
-  }
-  changed_.notify_all();
-  if (thread_.joinable()) thread_.join();
-}
+// What waits is not tracked any more.
+OdometryAlone::~OdometryAlone() { stop_ = true; }
 
 void OdometryAlone::Track(const InputFrame& frame) {
   if (frame.index <= last_) return;
   last_ = frame.index;
-  if (!thread_.joinable()) {
-    Do(frame);
-    return;
-  }
+  if (!own_thread_) return Do(frame);
   Wait(kMostWaiting - 1);
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    waiting_.push_back(frame);
-  }
-  changed_.notify_all();
-}
-
-const Odometry& OdometryAlone::Tracked() {
-  Wait(0);
-  return odometry_;
+  std::shared_future<void> before;
+  if (!waiting_.empty()) before = waiting_.back();
+  const auto work = [this, frame, before = std::move(before)]() mutable {
+    if (before.valid()) std::exchange(before, {}).get();  // or each would keep all before it
+    if (!stop_) Do(frame);
+  };
+  waiting_.push_back(std::async(std::launch::async, work).share());
 }
 
 void OdometryAlone::Finish() {
@@ -44,45 +33,21 @@ void OdometryAlone::Finish() {
   odometry_.FinishMapping();
 }
 
-double OdometryAlone::CpuSeconds() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return cpu_s_;
-}
-
-// Until no more than so many frames wait.
 void OdometryAlone::Wait(std::size_t most) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [&] { return waiting_.size() <= most || failure_; });
-  if (failure_) std::rethrow_exception(failure_);
+  const auto done = [](const std::shared_future<void>& tracked) {
+    return tracked.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  };
+  while (!waiting_.empty() && (waiting_.size() > most || done(waiting_.front()))) {
+    const std::shared_future<void> first = std::move(waiting_.front());
+    waiting_.pop_front();
+    first.get();
+  }
 }
 
 void OdometryAlone::Do(const InputFrame& frame) {
   const double begin = ThreadCpuMilliseconds();
   odometry_.Track(frame);
-  const double spent = ThreadCpuMilliseconds() - begin;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  cpu_s_ += 1e-3 * spent;
-}
-
-void OdometryAlone::Work() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  while (true) {
-    changed_.wait(lock, [this] { return stop_ || !waiting_.empty(); });
-    if (stop_) return;
-    const InputFrame frame = waiting_.front();
-    lock.unlock();
-    std::exception_ptr failure;
-    try {
-      Do(frame);
-    } catch (...) {
-      failure = std::current_exception();
-    }
-    lock.lock();
-    waiting_.pop_front();
-    failure_ = failure;
-    changed_.notify_all();
-    if (failure_) return;
-  }
+  cpu_s_ = cpu_s_ + 1e-3 * (ThreadCpuMilliseconds() - begin);
 }
 
 }  // namespace tutti

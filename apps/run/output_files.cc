@@ -1,45 +1,25 @@
 // Output folder, trajectories, graph and plots.
 #include <algorithm>
-#include <array>
-#include <cstdio>
+#include <iterator>
 #include <system_error>
 
 #include "apps/plot/plot.h"
-#include "apps/run/attempts.h"
-#include "apps/run/checkpoint.h"
-#include "apps/run/frame_places.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/backend/g2o_io.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
 
-// All that a run may leave, for RunFiles and IsResult to agree; pieces of the map have numbers.
-constexpr std::array<const char*, 12> kFiles = {"trajectory.txt",
-                                                "trajectory_odometry.txt",
-                                                "trajectory_online.txt",
-                                                "keyframes.txt",
-                                                "graph.g2o",
-                                                "loops.csv",
-                                                "summary.json",
-                                                "trajectory.svg",
-                                                "trajectory.png",
-                                                kMap,
-                                                "report.html",
-                                                "report.json"};
-constexpr const char* kPiece = "trajectory_piece_";
-
-bool IsResult(const fs::path& entry) {
-  std::error_code ignored;
-  const std::string name = entry.filename();
-  return !fs::is_directory(entry, ignored) &&
-         (std::count(kFiles.begin(), kFiles.end(), name) > 0 || name.rfind(kPiece, 0) == 0);
+template <class Key>
+std::optional<Eigen::Vector3d> Find(const std::map<Key, Eigen::Vector3d>& places, Key key) {
+  const auto found = places.find(key);
+  if (found == places.end()) return std::nullopt;
+  return found->second;
 }
 
 std::vector<Eigen::Vector3d> Positions(const Trajectory& trajectory, const Similarity& alignment) {
@@ -76,7 +56,7 @@ TrajectoryPlot MakePlot(const RunResult& result) {
   for (const Loop& loop : result.loops) {
     const auto a = places.AtEnd(loop.candidate, loop.candidate_stamp_s),
                b = places.AtEnd(loop.query, loop.query_stamp_s);
-    if (loop.accepted() && a && b) plot.edges.emplace_back(*a, *b);
+    if (loop.accepted && a && b) plot.edges.emplace_back(*a, *b);
   }
   plot.edges_name = "accepted loops (" + std::to_string(result.LoopsAccepted()) + ")";
   for (const FoundFrame& frame : result.found) {
@@ -86,18 +66,82 @@ TrajectoryPlot MakePlot(const RunResult& result) {
   return plot;
 }
 
-}  // namespace
-
-std::size_t RunResult::LoopsAccepted() const {
-  std::size_t count = 0;
-  for (const Loop& loop : loops) count += loop.accepted() ? 1 : 0;
-  return count;
+void WriteTum(const fs::path& file, const Trajectory& poses) {
+  WriteTrajectory(file, poses, TrajectoryFormat::kTum);
 }
 
-std::size_t RunResult::FramesRelocalized() const {
-  std::size_t count = 0;
-  for (const FoundFrame& frame : found) count += frame.by_loop ? 0 : 1;
-  return count;
+/// A file that a run may leave.
+struct RunFile {
+  const char* name;
+  bool needs_poses;
+  void (*write)(const RunResult& result, const fs::path& file);  // null: WriteOutputs or somebody else does
+};
+
+// In the order in which they are written: what is worth most comes first.
+const RunFile kFiles[] = {
+    {"trajectory.txt", true, [](const RunResult& r, const fs::path& file) { WriteTum(file, r.trajectory); }},
+    {"trajectory_online.txt", true,
+     [](const RunResult& r, const fs::path& file) { WriteTum(file, r.trajectory_online); }},
+    {"trajectory_odometry.txt", true,
+     [](const RunResult& r, const fs::path& file) { WriteTum(file, r.trajectory_odometry); }},
+    {"keyframes.txt", true,
+     [](const RunResult& r, const fs::path& file) { WriteTum(file, r.keyframe_trajectory); }},
+    {"summary.json", false,
+     [](const RunResult& r, const fs::path& file) { internal::WriteFile(file, SummaryJson(r)); }},
+    {"loops.csv", false,
+     [](const RunResult& r, const fs::path& file) { internal::WriteFile(file, LoopsCsv(r)); }},
+    {"graph.g2o", true, [](const RunResult& r, const fs::path& file) { WriteG2o(file, r.graph); }},
+    {"trajectory.svg", true, [](const RunResult& r, const fs::path& file) { WriteSvg(file, MakePlot(r)); }},
+    {"trajectory.png", true, [](const RunResult& r, const fs::path& file) { WritePng(file, MakePlot(r)); }},
+    {kMap, false, nullptr},
+    {"report.html", false, nullptr},
+    {"report.json", false, nullptr}};
+constexpr const char* kPiece = "trajectory_piece_";  // and a number: other pieces of the map
+
+bool IsResult(const fs::path& entry) {
+  std::error_code ignored;
+  const std::string name = entry.filename();
+  const auto same = [&](const RunFile& file) { return name == file.name; };
+  return !fs::is_directory(entry, ignored) &&
+         (std::any_of(std::begin(kFiles), std::end(kFiles), same) || name.rfind(kPiece, 0) == 0);
+}
+
+}  // namespace
+
+void Attempts::Try(const std::function<void()>& step) noexcept {
+  try {
+    step();
+  } catch (...) {
+    if (first_ == nullptr) first_ = std::current_exception();
+  }
+}
+
+void Attempts::Rethrow() const {
+  if (first_ != nullptr) std::rethrow_exception(first_);
+}
+
+std::string Attempts::Failure() const {
+  try {
+    Rethrow();
+    return "";
+  } catch (const std::exception& thrown) {
+    return thrown.what();
+  } catch (...) {
+    return "unknown";
+  }
+}
+
+FramePlaces::FramePlaces(const RunResult& result, const Similarity& alignment) {
+  for (const StampedPose& pose : result.trajectory) own_[pose.stamp_s] = alignment * pose.pose.translation;
+  if (!result.map) return;
+  first_frame_ = result.map->sessions.back().frame_offset;
+  for (const auto& [frame, pose] : result.map->keyframes) earlier_[frame] = alignment * pose.translation;
+}
+
+std::optional<Eigen::Vector3d> FramePlaces::At(double stamp_s) const { return Find(own_, stamp_s); }
+
+std::optional<Eigen::Vector3d> FramePlaces::AtEnd(std::int64_t frame, double stamp_s) const {
+  return frame < first_frame_ ? Find(earlier_, frame) : At(stamp_s);
 }
 
 OutputLayout RunLayout() {
@@ -111,44 +155,16 @@ OutputFolder OpenOutputFolder(const RunRequest& request, const fs::path& referen
   return OutputFolder(request.out, layout, request.keep, request.trace);
 }
 
-namespace {
-
-// In the order in which they are written: what is worth most comes first.
-std::vector<OutputFile> RunFiles(const RunResult& result) {
-  const auto trajectory = [](const Trajectory& poses) {
-    return [&poses](const fs::path& file) { WriteTrajectory(file, poses, TrajectoryFormat::kTum); };
-  };
-  const auto text = [&result](std::string (*text_of)(const RunResult&)) {
-    return [&result, text_of](const fs::path& file) { internal::WriteFile(file, text_of(result)); };
-  };
-  std::vector<OutputFile> files;
-  const bool poses = !result.appearance_only;
-  if (poses) {
-    files.push_back({"trajectory.txt", trajectory(result.trajectory)});
-    for (std::size_t i = 0; i < result.other_pieces.size(); ++i)
-      files.push_back({kPiece + std::to_string(i + 1) + ".txt", trajectory(result.other_pieces[i])});
-    files.push_back({"trajectory_online.txt", trajectory(result.trajectory_online)});
-    files.push_back({"trajectory_odometry.txt", trajectory(result.trajectory_odometry)});
-    files.push_back({"keyframes.txt", trajectory(result.keyframe_trajectory)});
-  }
-  files.push_back({"summary.json", text(SummaryJson)});
-  files.push_back({"loops.csv", text(LoopsCsv)});
-  if (poses) {
-    files.push_back({"graph.g2o", [&result](const fs::path& file) { WriteG2o(file, result.graph); }});
-    files.push_back(
-        {"trajectory.svg", [&result](const fs::path& file) { WriteSvg(file, MakePlot(result)); }});
-    files.push_back(
-        {"trajectory.png", [&result](const fs::path& file) { WritePng(file, MakePlot(result)); }});
-  }
-  return files;
-}
-
-}  // namespace
-
 void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& result,
                   const std::function<void(const fs::path&)>& map,
                   const std::function<std::string()>& trace) {
-  for (const OutputFile& file : RunFiles(result)) folder.Write(file);
+  for (const RunFile& file : kFiles) {
+    if (file.write == nullptr || (file.needs_poses && result.appearance_only)) continue;
+    folder.Write({file.name, [&](const fs::path& at) { file.write(result, at); }});
+    for (std::size_t i = 0; &file == kFiles && i < result.other_pieces.size(); ++i)
+      folder.Write({kPiece + std::to_string(i + 1) + ".txt",
+                    [&](const fs::path& at) { WriteTum(at, result.other_pieces[i]); }});
+  }
   Attempts more;
   more.Try([&] {
     if (!request.more_files) return;
@@ -159,16 +175,13 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
   result.folder = folder.Finish(result.Finished() && !more.Failed());
   std::vector<std::string> failures = folder.failures();
   if (more.Failed()) failures.push_back("the report: " + more.Failure());
-  if (trace) {
+  const auto elsewhere = [&](const std::function<void()>& write) {
     Attempts writing;
-    writing.Try([&] { internal::WriteFile(*request.trace, trace()); });
+    writing.Try(write);
     if (writing.Failed()) failures.push_back(writing.Failure());
-  }
-  if (map && request.save_map && !into_folder) {
-    Attempts writing;
-    writing.Try([&] { map(*request.save_map); });
-    if (writing.Failed()) failures.push_back(writing.Failure());
-  }
+  };
+  if (trace) elsewhere([&] { internal::WriteFile(*request.trace, trace()); });
+  if (map && request.save_map && !into_folder) elsewhere([&] { map(*request.save_map); });
   if (!result.failure.empty())
     internal::Say("the run broke off; what there was by then is in %s", result.folder.c_str());
   ThrowFailures(failures, result.folder);

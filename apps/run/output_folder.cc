@@ -70,6 +70,14 @@ bool Within(const fs::path& folder, const fs::path& file) {
   return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
 }
 
+// Says what is wrong with a folder, and that another one does.
+[[noreturn]] void Refuse(const fs::path& folder, const OutputLayout& layout, const std::string& wrong,
+                         const std::string& advice = "choose another ", const std::string& rest = "") {
+  throw InputError(folder.string() + ": " + wrong + "; " + advice + layout.option + rest);
+}
+
+constexpr const char* kFreeSpace = "free some space or choose another ";
+
 // Throws InputError if the folder has files that tutti did not write.
 void RefuseForeign(const fs::path& folder, const OutputLayout& layout, const std::optional<fs::path>& own) {
   std::error_code error;
@@ -83,17 +91,15 @@ void RefuseForeign(const fs::path& folder, const OutputLayout& layout, const std
     empty = false;
     if (layout.is_result(entry.path()) || std::count(passing.begin(), passing.end(), name) > 0) continue;
     if (entry.is_directory(error) && (name == kUnfinished || IsNumber(name))) continue;
-    throw InputError(folder.string() + ": holds " + name + ", which is no result of tutti; choose another " +
-                     layout.option + ", or move it away");
+    Refuse(folder, layout, "holds " + name + ", which is no result of tutti", "choose another ",
+           ", or move it away");
   }
-  if (error)
-    throw InputError(folder.string() + ": can't be read (" + error.message() + "); choose another " +
-                     layout.option);
+  if (error) Refuse(folder, layout, "can't be read (" + error.message() + ")");
   if (empty || layout.known || fs::exists(folder / kLock, error) ||
       ReadJson(folder / layout.last).contains(layout.key))
     return;
-  throw InputError(folder.string() + ": is not empty, and has no " + layout.last +
-                   " by which a result of tutti is known; choose another " + layout.option + ", or empty it");
+  Refuse(folder, layout, "is not empty, and has no " + layout.last + " by which a result of tutti is known",
+         "choose another ", ", or empty it");
 }
 
 }  // namespace
@@ -130,12 +136,8 @@ void OutputFolder::Check(const fs::path& folder, const OutputLayout& layout,
   const std::string failed = error ? error.message() : "";
   const std::string denied = access(folder.c_str(), W_OK | X_OK) == 0 ? "" : std::strerror(errno);
   for (const fs::path& at : made) fs::remove(at, error);  // empty as they are
-  if (!failed.empty())
-    throw InputError(folder.string() + ": the folder can't be made (" + failed + "); choose another " +
-                     layout.option);
-  if (!denied.empty())
-    throw InputError(folder.string() + ": no permission to write there (" + denied + "); choose another " +
-                     layout.option);
+  if (!failed.empty()) Refuse(folder, layout, "the folder can't be made (" + failed + ")");
+  if (!denied.empty()) Refuse(folder, layout, "no permission to write there (" + denied + ")");
   if (made.empty()) RefuseForeign(folder, layout, own);
 }
 
@@ -154,8 +156,7 @@ OutputFolder::OutputFolder(fs::path folder, OutputLayout layout, bool keep,
     if (keep_) KeepLeftovers();
   } catch (const fs::filesystem_error& thrown) {
     close(lock_);
-    throw InputError(folder_.string() + ": can't be written to (" + thrown.what() + "); choose another " +
-                     layout_.option);
+    Refuse(folder_, layout_, std::string("can't be written to (") + thrown.what() + ")");
   } catch (...) {
     close(lock_);
     throw;
@@ -177,36 +178,29 @@ void OutputFolder::RefuseLinks() const {
     if (!hidden && !folder && std::count(passing.begin(), passing.end(), name) == 0) continue;
     const fs::file_status status = entry.symlink_status();
     if (fs::is_regular_file(status) || fs::is_directory(status)) continue;
-    throw InputError(
-        entry.path().string() +
-        ": is a link or a device, and results are written into their folder alone; remove it, or "
-        "choose another " +
-        layout_.option);
+    Refuse(entry.path(), layout_, "is a link or a device, and results are written into their folder alone",
+           "remove it, or choose another ");
   }
 }
 
 void OutputFolder::Lock() {
   const fs::path file = folder_ / kLock;
   lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666);
-  if (lock_ < 0) {
-    throw InputError(folder_.string() + ": no permission to write there (" + std::strerror(errno) +
-                     "); choose another " + layout_.option);
-  }
+  if (lock_ < 0)
+    Refuse(folder_, layout_, std::string("no permission to write there (") + std::strerror(errno) + ")");
   // Where a file system has no locks, runs are on their own.
   if (flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     char holder[24] = {};
     const ssize_t size = read(lock_, holder, sizeof holder - 1);
     close(lock_);
     const std::string id = size > 0 ? " (process " + std::string(holder) + ")" : "";
-    throw InputError(folder_.string() + ": another tutti" + id +
-                     " is writing there; wait for it, or choose another " + layout_.option);
+    Refuse(folder_, layout_, "another tutti" + id + " is writing there", "wait for it, or choose another ");
   }
   const std::string id = std::to_string(getpid());
   if (ftruncate(lock_, 0) != 0 || write(lock_, id.data(), id.size()) < 0) {
     const int error = errno;
     close(lock_);
-    throw InputError(folder_.string() + ": can't be written to (" + std::strerror(error) +
-                     "); free some space or choose another " + layout_.option);
+    Refuse(folder_, layout_, std::string("can't be written to (") + std::strerror(error) + ")", kFreeSpace);
   }
 }
 
@@ -218,15 +212,11 @@ void OutputFolder::CheckRoom() const {
   file.close();
   const int reason = errno;
   fs::remove(probe, error);
-  if (!file) {
-    throw InputError(folder_.string() + ": can't be written to (" + std::strerror(reason) +
-                     "); free some space or choose another " + layout_.option);
-  }
+  if (!file)
+    Refuse(folder_, layout_, std::string("can't be written to (") + std::strerror(reason) + ")", kFreeSpace);
   const fs::space_info space = fs::space(folder_, error);
-  if (!error && space.available < kRoomBytes) {
-    throw InputError(folder_.string() +
-                     ": less than 32 MB are free there; free some space or choose another " + layout_.option);
-  }
+  if (!error && space.available < kRoomBytes)
+    Refuse(folder_, layout_, "less than 32 MB are free there", kFreeSpace);
 }
 
 // The file that marks a result as complete is the last one.

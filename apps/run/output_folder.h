@@ -23,7 +23,7 @@ struct OutputLayout {
   std::string last;
   std::string key;                ///< that this file has, by which it is known as tutti's
   std::vector<std::string> live;  ///< files that grow while the command runs; gone when it has ended
-  /// Of entries that may be inside and are left alone: results of their own. May be null.
+  /// True for entries that may be inside and are left alone, as results of their own. May be null.
   bool (*is_part)(const std::filesystem::path& entry) = nullptr;
   std::vector<std::string> until_finished = {};  ///< as live, but they stay where the command ended early
   const char* option = "--out";                  ///< that the folder was given with, for messages

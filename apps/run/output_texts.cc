@@ -8,10 +8,8 @@
 
 #include "apps/run/graph_json.h"
 #include "apps/run/outputs.h"
-#include "apps/run/run_health.h"
-#include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
-#include "apps/run/timing.h"
+#include "apps/run/run_signs.h"
 #include "core/angle.h"
 #include "tutti/slam/version.h"
 
@@ -203,14 +201,7 @@ std::string Improvement(double before, double after) {
   return Cell(before / after, 2, "x better");
 }
 
-double FocalLengthCpuSeconds(const RunResult& r) {
-  double seconds = 0;
-  for (const auto& measured : {r.focal_length, r.focal_length_of_map})
-    seconds += measured ? measured->cpu_s : 0;
-  return seconds;
-}
-
-// As --camera takes it, of the images as they are stored; empty: what the run had is as good.
+// What --camera takes, for the images as they are stored; empty: what the run had is as good.
 std::string BetterCamera(const RunResult& r) {
   constexpr double kSame = 0.005, kSurer = 0.7;
   if (!r.focal_length || !r.focal_length_of_map || !r.focal_length_of_map->measured) return "";
@@ -273,12 +264,14 @@ std::string SummaryJson(const RunResult& r) {
   json["keyframes"] = r.keyframes;
   json["loops"] = LoopsJson(r);
   if (r.config.run.certify) json["graph"] = GraphJson(r);
+  const double focal_length_cpu_s = (r.focal_length ? r.focal_length->cpu_s : 0.0) +
+                                    (r.focal_length_of_map ? r.focal_length_of_map->cpu_s : 0.0);
   Json stages = Json::object();
   for (const auto& [name, ms] : r.stage_ms) stages[name] = ms;
   json["timing"] = {
       {"wall_s", r.wall_s},
       {"cpu_s", r.cpu_s},
-      {"focal_length_cpu_s", FocalLengthCpuSeconds(r)},
+      {"focal_length_cpu_s", focal_length_cpu_s},
       {"odometry_alone_cpu_s", r.odometry_alone_cpu_s},
       {"frame_ms", {{"median", Quantile(r.frame_ms, 0.5)}, {"p99", Quantile(r.frame_ms, 0.99)}}},
       {"latency_ms", {{"median", Quantile(r.latency_ms, 0.5)}, {"p99", Quantile(r.latency_ms, 0.99)}}},

@@ -1,9 +1,14 @@
 // The files that a run leaves behind, and the table on the terminal.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstdint>
+#include <exception>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +18,41 @@
 
 namespace tutti {
 
+/// Steps of a run that go on after one has failed, so that what there is gets written.
+class Attempts {
+ public:
+  void Try(const std::function<void()>& step) noexcept;
+  bool Failed() const { return first_ != nullptr; }
+  /// What the first failure was; empty for none.
+  std::string Failure() const;
+  /// Throws it on, if there is one.
+  void Rethrow() const;
+
+ private:
+  std::exception_ptr first_;
+};
+
 /// RunRequest::save_map of a map that lies beside the other results.
 constexpr const char* kMap = "map.tutti";
+
+/// Where the frames of a run are in its map, for what draws them: positions of trajectory.txt, and of the
+/// keyframes that the map had before [m; one camera without a reference: in units of the first scale], after
+/// `alignment`.
+class FramePlaces {
+ public:
+  FramePlaces(const RunResult& result, const Similarity& alignment);
+
+  /// Where the run's own frame with this stamp [s] is; nothing if trajectory.txt has no pose for it.
+  std::optional<Eigen::Vector3d> At(double stamp_s) const;
+  /// Where an end of a loop is: the frame has its number in the map (Loop), and a stamp of its
+  /// recording.
+  std::optional<Eigen::Vector3d> AtEnd(std::int64_t frame, double stamp_s) const;
+
+ private:
+  std::int64_t first_frame_ = 0;
+  std::map<double, Eigen::Vector3d> own_;            // by stamp
+  std::map<std::int64_t, Eigen::Vector3d> earlier_;  // by number
+};
 
 /// What a run leaves in its folder.
 OutputLayout RunLayout();

@@ -1,10 +1,11 @@
-#include "apps/run/photo_lens.h"
-
+// What the camera wrote into a photo of its lens (EXIF).
 #include <libexif/exif-data.h>
 
 #include <cmath>
 #include <cstdio>
 #include <memory>
+
+#include "apps/run/recording.h"
 
 namespace tutti {
 namespace {

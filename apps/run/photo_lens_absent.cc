@@ -3,7 +3,7 @@
 #include <fstream>
 #include <string_view>
 
-#include "apps/run/photo_lens.h"
+#include "apps/run/recording.h"
 
 namespace tutti {
 

@@ -1,8 +1,8 @@
-#include "apps/run/planted_loops.h"
-
+// False loops on purpose (run.inject_false_loops).
 #include <algorithm>
 #include <vector>
 
+#include "apps/run/slam_run.h"
 #include "apps/slam/loop_constraint.h"
 #include "backend/graph/false_loops.h"
 #include "core/angle.h"

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 
 #include "apps/run/calibration_file.h"
-#include "apps/run/photo_lens.h"
 #include "core/camera_text.h"
 #include "core/example_configs.h"
 #include "core/text_reader.h"
@@ -159,7 +157,7 @@ class Recogniser {
     return fs::exists(dataset_ / name, ignored);
   }
 
-  // Of tutti generate, or somebody's own; other programs have files of that name, too.
+  // `tutti generate` writes one, and a user may have; other programs have files of that name, too.
   bool HasConfiguration() const {
     std::error_code ignored;
     if (!fs::is_regular_file(dataset_ / kConfiguration, ignored)) return false;
@@ -179,7 +177,7 @@ class Recogniser {
     out_.config = LoadConfig(dataset_ / kConfiguration);
     out_.config.loops.ltm_file.clear();  // nobody gave this file: what it names is not written
     if (!sensor_) sensor_ = Options().sensor;
-    if (request_.HasLens()) Requested();
+    if (request_.HasLens()) Requested(request_);
   }
 
   void Kitti() {
@@ -193,21 +191,11 @@ class Recogniser {
     layout_ += ")";
     out_.config = Published(sensor_ == Sensor::kStereo ? "kitti_00-02_stereo" : "kitti_00-02_mono");
     ForgetCamera();
-    if (request_.HasLens()) {
-      Requested();
-    } else if (Exists("calib.txt")) {
-      source_ = "calib.txt";
-    } else {
-      BesideOrGuess();
-    }
-    if (sensor_ == Sensor::kStereo && Options().baseline_m == 0 && !Options().right && !Exists("calib.txt")) {
-      if (request_.sensor)
-        throw InputError(dataset_.string() +
-                         ": the distance of the two cameras is not known; a calib.txt "
-                         "has it, an ORB-SLAM file (--calibration), or --set camera.baseline_m=METRES");
-      sensor_ = Sensor::kMono;
-      note_ = "the right camera is not used: no file says how far apart the two are";
-    }
+    SetLensOr(Exists("calib.txt") ? "calib.txt" : "");
+    if (!Exists("calib.txt") && !IsApart())
+      LeaveRightOut(
+          Sensor::kMono,
+          "a calib.txt has it, an ORB-SLAM file (--calibration), or --set camera.baseline_m=METRES");
   }
 
   void Tum() {
@@ -226,16 +214,11 @@ class Recogniser {
     const LayoutCalibration own = ReadTumCalibration(dataset_);
     units_ = own.depth_units_per_m;
     if (known.empty()) Options().depth_units_per_m = 0;
-    if (request_.HasLens()) {
-      Requested();
-    } else if (!known.empty() && !CalibrationBeside(dataset_)) {
-      Options().camera = published;
-      source_ = "the one published for freiburg" + known.substr(6);
-    } else if (own.rig.left) {
-      source_ = own.source;
-    } else {
-      BesideOrGuess();
-    }
+    const bool of_the_folder = !known.empty() && !CalibrationBeside(dataset_);
+    if (of_the_folder && !request_.HasLens()) Options().camera = published;
+    SetLensOr(of_the_folder  ? "the one published for freiburg" + known.substr(6)
+              : own.rig.left ? own.source
+                             : "");
   }
 
   // The public data set's cameras are named in its folders.
@@ -254,8 +237,7 @@ class Recogniser {
     if (!sensor_) sensor_ = pair ? Sensor::kStereo : Sensor::kMono;
     layout_ = sensor_ == Sensor::kStereo ? "EuRoC (cam0, cam1)" : "EuRoC (cam0)";
     out_.config = Published(sensor_ == Sensor::kStereo ? "euroc_stereo" : "euroc_mono");
-    source_ = "sensor.yaml";
-    if (request_.HasLens()) Requested();
+    SetLensOr("sensor.yaml");
   }
 
   // What suits the sensor, and the places where such data are recorded.
@@ -292,28 +274,17 @@ class Recogniser {
       const PinholeCamera seen = OpenDataset(dataset_, any)->Rig().camera;
       known = ReadLayoutCalibration(dataset_, *found, cv::Size(seen.width, seen.height));
     }
-    if (request_.HasLens()) {
-      Requested();
-    } else if (known.rig.left) {
-      source_ = known.source;
-    } else if (const auto file = found ? CalibrationOf(*found) : std::nullopt) {
+    const auto file = found ? CalibrationOf(*found) : std::nullopt;
+    if (file && !known.rig.left && !request_.HasLens()) {
       CameraRequest request;
       request.calibration = file;
-      Options().sensor = *sensor_;
-      source_ = SetRequested(dataset_, request, Options());
+      Requested(request);
     } else {
-      BesideOrGuess();
+      SetLensOr(known.rig.left ? known.source : "");
     }
-    const bool apart =
-        Options().baseline_m > 0 || Options().right || known.rig.baseline_m > 0 || known.rig.right;
-    if (sensor_ != Sensor::kStereo || apart) return;
-    if (request_.sensor)
-      throw InputError(
-          dataset_.string() +
-          ": the distance of the two cameras is not known; a calibration of both (--calibration) or "
-          "--set camera.baseline_m=METRES says it");
-    sensor_ = depth ? Sensor::kRgbd : Sensor::kMono;
-    note_ = "the right camera is not used: no file says how far apart the two are";
+    if (!IsApart() && !(known.rig.baseline_m > 0) && !known.rig.right)
+      LeaveRightOut(depth ? Sensor::kRgbd : Sensor::kMono,
+                    "a calibration of both (--calibration) or --set camera.baseline_m=METRES says it");
   }
 
   std::optional<fs::path> CalibrationOf(const FoundLayout& found) const {
@@ -326,9 +297,9 @@ class Recogniser {
   void Single(DatasetType type, bool live) {
     const bool two = CameraSources(dataset_.string()).size() > 1;
     if (two && !sensor_)
-      throw InputError(dataset_.string() +
-                       ": what are the two cameras? Give --sensor stereo (LEFT,RIGHT) or --sensor rgbd "
-                       "(COLOUR,DEPTH)");
+      throw InputError(
+          dataset_.string() +
+          ": what are the two cameras? Give --sensor stereo (LEFT,RIGHT) or --sensor rgbd (COLOUR,DEPTH)");
     layout_ = live && IsStream(dataset_)     ? "a stream"
               : two                          ? "two cameras"
               : OpensOnce(dataset_)          ? "a video through a pipe"
@@ -341,15 +312,10 @@ class Recogniser {
     if (type != DatasetType::kImages) Options().rate_hz = 0;  // its own
     if (type == DatasetType::kBag) units_ = 1000;             // REP 118
     if (!sensor_) sensor_ = Sensor::kMono;
-    if (request_.HasLens()) {
-      Requested();
-    } else if (type == DatasetType::kBag) {
-      source_ = "camera_info";
-    } else if (IsCameraDevice(dataset_.string()) && !IsStream(dataset_.string())) {
-      source_.clear();  // appearance only
-    } else {
-      BesideOrGuess();
-    }
+    const bool device = IsCameraDevice(dataset_.string()) && !IsStream(dataset_.string());
+    // A device without a lens: appearance only.
+    if (!device || type == DatasetType::kBag || request_.HasLens())
+      SetLensOr(type == DatasetType::kBag ? "camera_info" : "");
   }
 
   void ForgetCamera() {
@@ -358,21 +324,37 @@ class Recogniser {
     Options().T_right_left = {};
     Options().baseline_m = 0;
   }
-  void Requested() {
+  // The distance of two cameras is known.
+  bool IsApart() { return Options().baseline_m > 0 || Options().right; }
+  // `advice`: where the distance of the two cameras may stand.
+  void LeaveRightOut(Sensor other, const char* advice) {
+    if (sensor_ != Sensor::kStereo) return;
+    if (request_.sensor)
+      throw InputError(dataset_.string() + ": the distance of the two cameras is not known; " + advice);
+    sensor_ = other;
+    note_ = "the right camera is not used: no file says how far apart the two are";
+  }
+  void Requested(const CameraRequest& request) {
     Options().sensor = sensor_.value_or(Sensor::kMono);
-    source_ = SetRequested(dataset_, request_, Options());
+    source_ = SetRequested(dataset_, request, Options());
+  }
+  // The camera of the command line, else the one that is known from `source`, else one beside the images,
+  // else a guess.
+  void SetLensOr(const std::string& source) {
+    if (request_.HasLens()) return Requested(request_);
+    source_ = source;
+    if (source_.empty()) BesideOrGuess();
   }
   void BesideOrGuess() {
     std::error_code ignored;
     const fs::path folder = fs::is_directory(dataset_, ignored) ? dataset_ : dataset_.parent_path();
     CameraRequest request;
     if (!IsStream(dataset_.string()) && !OpensOnce(dataset_)) request.calibration = CalibrationBeside(folder);
-    Options().sensor = sensor_.value_or(Sensor::kMono);
     if (!request.calibration) {
       request.view_deg = kUsualView;
       out_.guessed_lens = true;
     }
-    source_ = SetRequested(dataset_, request, Options());
+    Requested(request);
     if (!out_.guessed_lens) return;
     source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
     if (!OpensOnce(dataset_)) UsePhotos();

@@ -1,8 +1,8 @@
-#include "apps/run/run_evaluation.h"
-
+// A run against its ground truth.
 #include <algorithm>
 #include <cmath>
 
+#include "apps/run/run_parts.h"
 #include "core/angle.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
@@ -22,11 +22,8 @@ TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, b
     score.reason = "no frame has a pose";
     return score;
   }
-  EvaluationOptions options;
-  options.alignment = with_scale ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSE3;
-  options.max_time_difference_s = kMaxDifference;
   try {
-    const EvaluationReport report = EvaluateTrajectory(reference, estimate, options);
+    const EvaluationReport report = EvaluateTrajectory(reference, estimate, EvaluationWith(with_scale));
     score.valid = true;
     score.rotations = report.rotations;
     score.poses = report.pairs;
@@ -100,6 +97,13 @@ std::optional<bool> Judge(const Loop& loop, const Trajectory& reference, std::op
 }
 
 }  // namespace
+
+EvaluationOptions EvaluationWith(bool scale) {
+  EvaluationOptions options;
+  options.alignment = scale ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSE3;
+  options.max_time_difference_s = kMaxDifference;
+  return options;
+}
 
 void MeasureLoops(RunResult& result) {
   result.loop_errors.clear();

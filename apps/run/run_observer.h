@@ -29,6 +29,12 @@ struct RunState {
 
   /// What has a smaller frame number is of an earlier recording than the newest.
   std::int64_t FirstFrame() const { return sessions.back(); }
+  /// The frames of the newest recording.
+  FrameRange Session() const {
+    FrameRange session;
+    if (FirstFrame() > 0) session.first = FirstFrame();
+    return session;
+  }
   /// The recording of a frame, by its number in the map.
   std::size_t SessionOf(std::int64_t frame) const {
     const auto next = std::upper_bound(sessions.begin() + 1, sessions.end(), frame);

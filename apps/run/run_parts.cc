@@ -2,12 +2,10 @@
 
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <limits>
 #include <map>
 #include <set>
 
-#include "apps/run/run_note.h"
 #include "core/median.h"
 #include "tutti/core/error.h"
 
@@ -119,15 +117,13 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 void CollectEarlierSessions(const RunState& state, RunResult& result) {
   result.map.value().earlier.assign(state.sessions.size() - 1, {});
   const Pose T_camera_body = result.rig.T_body_camera.Inverse();
-  const std::vector<int> pieces = FramePieces(
-      state.odometry->map(), FrameRange{state.FirstFrame(), std::numeric_limits<std::int64_t>::max()});
+  const std::vector<int> pieces = FramePieces(state.odometry->map(), state.Session());
   if (pieces.empty()) return;
   for (const int id : state.odometry->map().KeyframeIds()) {
     const std::int64_t frame = state.odometry->map().keyframe(id).frame_index;
     if (frame >= state.FirstFrame() || state.odometry->map().keyframe(id).piece != pieces.front()) continue;
     const Pose T_world_body = state.odometry->map().keyframe(id).T_world_camera * T_camera_body;
-    result.map->earlier[state.SessionOf(frame)].push_back(
-        {state.odometry->map().keyframe(id).stamp_s, T_world_body});
+    result.map->earlier[state.SessionOf(frame)].push_back({state.odometry->map().keyframe(id).stamp_s, T_world_body});
     result.map->keyframes[frame] = T_world_body;
   }
 }
@@ -154,15 +150,13 @@ void CollectMap(const RunState& state, RunResult& result) {
   result.peak_memory_mb = PeakMemoryMb();
   if (result.appearance_only) return;
   const Odometry& odometry = *state.odometry;
-  FrameRange session;
-  if (state.FirstFrame() > 0) session.first = state.FirstFrame();
+  const FrameRange session = state.Session();
   result.trajectory = BodyTrajectory(FrameTrajectory(odometry.map(), -1, session), result.rig);
   result.frames_tracked = result.trajectory.size();
   const std::vector<int> pieces = FramePieces(odometry.map(), session);
   result.other_pieces.clear();
   for (std::size_t i = 1; i < pieces.size(); ++i)
-    result.other_pieces.push_back(
-        BodyTrajectory(FrameTrajectory(odometry.map(), pieces[i], session), result.rig));
+    result.other_pieces.push_back(BodyTrajectory(FrameTrajectory(odometry.map(), pieces[i], session), result.rig));
   result.in_map = !pieces.empty() && pieces.front() < odometry.LastView().session_piece;
   result.trajectory_odometry = result.trajectory;
   result.stereo_row_error_px = odometry.Report().stereo_row_error_px;

@@ -1,6 +1,7 @@
 // Everything that a run found out; what summary.json, the tables and the plots are made from.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -165,9 +166,12 @@ struct RunResult {
 
   std::filesystem::path folder;  ///< where everything was written: RunRequest::out, or "unfinished" inside
 
-  std::size_t LoopsAccepted() const;
+  std::size_t LoopsAccepted() const { return CountAccepted(loops); }
   /// Lost frames whose place the loop detector knew.
-  std::size_t FramesRelocalized() const;
+  std::size_t FramesRelocalized() const {
+    return static_cast<std::size_t>(
+        std::count_if(found.begin(), found.end(), [](const FoundFrame& f) { return !f.by_loop; }));
+  }
   /// False if it ended before its data set did.
   bool Finished() const { return failure.empty() && (!interrupted || endless); }
   /// True if the run is void: frames were there, calibration was there, and not one got a pose.

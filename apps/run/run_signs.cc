@@ -2,8 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <string_view>
 
 #include "core/median.h"
+#include "core/terminal.h"
+#include "tutti/frontend/dataset.h"
 
 namespace tutti {
 namespace {
@@ -22,13 +27,15 @@ bool HasMap(const RunResult& r) {
   return !r.given_odometry && !r.Void() && r.map_figures.keyframes >= kEnoughKeyframes;
 }
 
+Value If(bool known, double value) { return known ? Value(value) : std::nullopt; }
+
+bool IsMono(const RunResult& r) { return r.rig.sensor == Sensor::kMono; }
+
 Value Share(double part, double whole) { return whole > 0 ? Value(part / whole) : std::nullopt; }
 
 double FramesRead(const RunResult& r) {
   return static_cast<double>(r.frames_total - r.bad.size() - r.frames_dropped);
 }
-
-Value FramesPosed(const RunResult& r) { return Share(static_cast<double>(r.frames_tracked), FramesRead(r)); }
 
 Value ShareOfLargestPiece(const RunResult& r) {
   auto all = static_cast<double>(r.frames_tracked);
@@ -42,7 +49,7 @@ Value FewInliers(const RunResult& r) {
   return Share(static_cast<double>(few), static_cast<double>(r.frame_inliers.size()));
 }
 
-// Of the keyframes' landmarks; 0: not known.
+// The median depth of the keyframes' landmarks; 0: not known.
 double SceneDepth(const RunResult& r) {
   std::vector<double> depths;
   for (const auto& [frame, depth] : r.map_figures.depth) depths.push_back(depth);
@@ -76,22 +83,6 @@ Value SpeedJump(const RunResult& r) {
   return jump;
 }
 
-Value JumpOfScale(const RunResult& r) {
-  return HasMap(r) && r.rig.sensor == Sensor::kMono ? Value(r.map_figures.scale_jump) : std::nullopt;
-}
-
-Value Landmarks(const RunResult& r) { return HasMap(r) ? Value(r.map_figures.landmarks) : std::nullopt; }
-
-Value WithoutParallax(const RunResult& r) {
-  return HasMap(r) && r.rig.sensor == Sensor::kMono ? Value(r.map_figures.without_parallax) : std::nullopt;
-}
-
-Value Misfit(const RunResult& r) { return HasMap(r) ? Value(r.map_figures.misfit_px) : std::nullopt; }
-
-Value DepthMisfit(const RunResult& r) {
-  return HasMap(r) && r.rig.sensor != Sensor::kMono ? Value(r.map_figures.depth_misfit) : std::nullopt;
-}
-
 Value FocalLengthOff(const RunResult& r) {
   if (!HasMap(r) || !r.lens_check.measured) return std::nullopt;
   return std::max(0.0, std::abs(std::log(r.lens_check.focal_ratio)) - kSigmas * r.lens_check.sigma);
@@ -119,33 +110,17 @@ Value LoopsRefused(const RunResult& r) {
   return Share(static_cast<double>(refused), static_cast<double>(all));
 }
 
-Value CalibrationFindings(const RunResult& r) { return static_cast<double>(r.calibration_findings.size()); }
-
 Value DamagedImages(const RunResult& r) {
   const Value bad =
       Share(static_cast<double>(r.bad.size()), static_cast<double>(r.frames_total - r.frames_dropped));
   return 1 - (1 - bad.value_or(0)) * (1 - r.skipped_share);
 }
 
-Value DroppedFrames(const RunResult& r) {
-  if (!r.realtime) return std::nullopt;
-  return Share(static_cast<double>(r.frames_dropped), static_cast<double>(r.frames_total));
-}
-
-Value WithoutDepth(const RunResult& r) {
-  if (r.rig.sensor == Sensor::kMono) return std::nullopt;
-  return Share(static_cast<double>(r.frames_without_depth), FramesRead(r));
-}
-
-// Beyond what the ground truth itself may be off.
-Value ErrorOver(const RunResult& r, double length_m) {
+// Beyond what the ground truth itself may be off, as share of a length.
+Value ErrorOver(const RunResult& r, double RunEvaluation::*length_m) {
   if (!r.evaluation || !r.evaluation->slam.valid) return std::nullopt;
-  return Share(std::max(0.0, r.evaluation->slam.ate.rmse - kReferenceOff), length_m);
+  return Share(std::max(0.0, r.evaluation->slam.ate.rmse - kReferenceOff), *r.evaluation.*length_m);
 }
-
-Value ErrorOfPath(const RunResult& r) { return ErrorOver(r, r.evaluation ? r.evaluation->path_m : 0); }
-
-Value ErrorOfExtent(const RunResult& r) { return ErrorOver(r, r.evaluation ? r.evaluation->extent_m : 0); }
 
 // At least: a scale is known as well as the positions that it is from.
 Value ScaleOff(const RunResult& r) {
@@ -156,11 +131,35 @@ Value ScaleOff(const RunResult& r) {
   return std::exp(std::max(0.0, std::abs(std::log(scaled.scale)) - uncertain));
 }
 
-Value OdometryJumps(const RunResult& r) {
-  return r.given_odometry ? Value(r.followed.jumps.size()) : std::nullopt;
+std::string Shown(const RunSign& sign) {
+  const std::string_view unit = sign.kind->unit;
+  char text[40];
+  if (unit == "share") {
+    std::snprintf(text, sizeof text, "%.1f %%", 100 * sign.value);
+  } else {
+    std::snprintf(text, sizeof text, unit == "1" ? "%.0f" : "%.2f", sign.value);
+  }
+  return text;
 }
 
-Value CameraGuessed(const RunResult& r) { return r.camera_guessed ? 1 : 0; }
+// Most frames have no pose: what one image shows is not in the next.
+bool ShowsNoFilm(const RunResult& result, const RunHealth& health) {
+  std::error_code ignored;
+  const bool no_photos = result.rig.sensor != Sensor::kMono || result.dataset.empty() ||
+                         IsCamera(result.dataset) ||
+                         std::filesystem::is_regular_file(result.dataset, ignored);  // a video, a bag
+  if (health.word != HealthWord::kFailed || no_photos || result.given_odometry) return false;
+  return std::any_of(health.signs.begin(), health.signs.end(), [](const RunSign& sign) {
+    return sign.kind->name == std::string_view("frames_posed") && sign.kind->IsFailed(sign.value);
+  });
+}
+
+std::string Sentence(const RunSign& sign) {
+  std::string text = sign.kind->says;
+  const std::size_t place = text.find("%s");
+  if (place != std::string::npos) text.replace(place, 2, Shown(sign));
+  return text + "; " + sign.kind->advice;
+}
 
 }  // namespace
 
@@ -170,9 +169,9 @@ const std::vector<SignKind>& SignKinds() {
   static const std::vector<SignKind> kinds = {
       {"frames_posed", "share", "frames with a pose in trajectory.txt, of those that could be read", kBelow,
        0.95, 0.5, "only %s of the frames have a pose in trajectory.txt",
-       "frames.lost_stretches in summary.json says where and why; slower motion, more light or more frames "
-       "a second help",
-       FramesPosed},
+       "frames.lost_stretches in summary.json says where and why; slower motion, more light or more frames a "
+       "second help",
+       [](const RunResult& r) { return Share(static_cast<double>(r.frames_tracked), FramesRead(r)); }},
       {"largest_piece", "share", "poses in trajectory.txt, of those in all submaps", kBelow, 0.95, 0.5,
        "the map consists of several submaps: only %s of the poses are in trajectory.txt",
        "the others are in trajectory_piece_1.txt, ...; a view of a known place joins them",
@@ -187,11 +186,15 @@ const std::vector<SignKind>& SignKinds() {
        "%s of the frames were dropped, since the run could not follow",
        "a lower odometry.features, smaller images or another machine follow; without --realtime every frame "
        "counts",
-       DroppedFrames},
+       [](const RunResult& r) {
+         return r.realtime ? Share(double(r.frames_dropped), double(r.frames_total)) : std::nullopt;
+       }},
       {"without_depth", "share", "stereo and depth images: frames that came without a right or depth image",
        kAbove, 0.25, kNever, "%s of the frames came without a right or depth image",
        "frames.bad_depth in summary.json and the notes at the start of the run say which and why",
-       WithoutDepth},
+       [](const RunResult& r) {
+         return IsMono(r) ? std::nullopt : Share(double(r.frames_without_depth), FramesRead(r));
+       }},
       {"few_inliers", "share", "frames with a pose by landmarks, of which fewer than 30 agree with it",
        kAbove, 0.25, 0.5, "%s of the poses rest on fewer than 30 landmarks",
        "dark, blurred or bare images; raise odometry.features, or slow down", FewInliers},
@@ -202,36 +205,38 @@ const std::vector<SignKind>& SignKinds() {
        kAbove, 0, kNever, "the given odometry has jumps: %s",
        "given_odometry.jumps in summary.json says when; wrong poses were replaced by those between their "
        "neighbours, other jumps have no weight",
-       OdometryJumps},
+       [](const RunResult& r) { return If(r.given_odometry, double(r.followed.jumps.size())); }},
       {"scale_jump", "factor",
        "one camera: greatest factor by which depths and speed changed together between three keyframes and "
        "the next three",
        kAbove, 2, kNever, "the scale jumps: depths and speed change together by a factor of %s",
-       "one camera can't see its scale; a loop, stereo or depth can", JumpOfScale},
+       "one camera can't see its scale; a loop, stereo or depth can",
+       [](const RunResult& r) { return If(HasMap(r) && IsMono(r), r.map_figures.scale_jump); }},
       {"landmarks", "1", "landmarks that a keyframe sees, median", kBelow, 40, 10,
        "the map is thin: a keyframe sees %s landmarks", "bare or dark images; raise odometry.features",
-       Landmarks},
+       [](const RunResult& r) { return If(HasMap(r), r.map_figures.landmarks); }},
       {"without_parallax", "share",
        "one camera: keyframes whose landmarks are seen under less than 1 deg from the others", kAbove, 0.5,
        kNever, "the camera turns more than it moves: %s of the keyframes have no parallax",
-       "move sideways while turning", WithoutParallax},
+       "move sideways while turning",
+       [](const RunResult& r) { return If(HasMap(r) && IsMono(r), r.map_figures.without_parallax); }},
       {"misfit", "px", "reprojection error of landmarks that three keyframes see, median", kAbove, 1.5,
        kNever, "landmarks are %s px off where keyframes see them, in the median",
-       "check the camera: focal length, distortion, rolling shutter; tutti calibrate-check", Misfit},
+       "check the camera: focal length, distortion, rolling shutter; tutti calibrate-check",
+       [](const RunResult& r) { return If(HasMap(r), r.map_figures.misfit_px); }},
       {"depth_misfit", "share",
        "stereo and depth images: how far landmarks that three keyframes see are from where one of them "
        "measures them, of their depth, median",
        kAbove, 0.08, kNever,
        "landmarks are %s of their depth off where keyframes measure them, in the median",
        "check focal length and baseline or depth scale, and that images and depth are of the same time",
-       DepthMisfit},
+       [](const RunResult& r) { return If(HasMap(r) && !IsMono(r), r.map_figures.depth_misfit); }},
       {"focal_length_off", "share",
-       "how far, at least, the focal length that fits the map best is from the given one (less 1.25 "
-       "standard deviations)",
+       "how far, at least, the focal length that fits the map best is from the given one (less 1.25 standard "
+       "deviations)",
        kAbove, 0.02, kNever, "the map fits another focal length better, at least %s away",
        "check fx and fy; without --config and --camera tutti run measures them, and "
-       "focal_length.better_camera in "
-       "summary.json is what the whole map says then",
+       "focal_length.better_camera in summary.json is what the whole map says then",
        FocalLengthOff},
       {"lens_off", "share",
        "radial distortion that the calibration left over, at the middle of the image's side edge", kAbove,
@@ -242,18 +247,19 @@ const std::vector<SignKind>& SignKinds() {
        "its shape or scale may be wrong; loops.csv says why each was refused", LoopsRefused},
       {"calibration_findings", "1", "findings of tutti calibrate-check", kAbove, 0, kNever,
        "the calibration can't be right: findings: %s", "calibration_findings in summary.json says what to do",
-       CalibrationFindings},
+       [](const RunResult& r) { return Value(r.calibration_findings.size()); }},
       {"error_of_path", "share", "with ground truth: ATE beyond 2 cm, of the path's length", kAbove, 0.05,
        0.15, "the ground truth says that positions are off by %s of the path",
-       "the table above has the figures; check camera, depth scale and time stamps", ErrorOfPath},
+       "the table above has the figures; check camera, depth scale and time stamps",
+       [](const RunResult& r) { return ErrorOver(r, &RunEvaluation::path_m); }},
       {"error_of_extent", "share",
        "with ground truth: ATE beyond 2 cm, of how far positions are from their middle (RMS)", kAbove, 0.25,
        0.75, "the ground truth says that positions are off by %s of the trajectory's extent",
-       "its shape is another one; look at trajectory.svg", ErrorOfExtent},
+       "its shape is another one; look at trajectory.svg",
+       [](const RunResult& r) { return ErrorOver(r, &RunEvaluation::extent_m); }},
       {"scale_off", "factor",
        "stereo and depth images, with ground truth: factor, at least, between the scale of the trajectory "
-       "and "
-       "that of the ground truth",
+       "and that of the ground truth",
        kAbove, 1.05, 1.5, "the ground truth says that the scale is off by a factor of %s at least",
        "check the depth scale (--set dataset.depth_units_per_m=1000 for millimetres), the baseline or the "
        "focal length",
@@ -261,7 +267,7 @@ const std::vector<SignKind>& SignKinds() {
       {"camera_guessed", "1", "1: nobody calibrated the camera, and its focal length could not be measured",
        kAbove, 0, kNever, "the camera is not calibrated, its focal length is a guess",
        "turns and lengths can be wrong by tens of percent; give --camera, --fov or --calibration",
-       CameraGuessed},
+       [](const RunResult& r) { return Value(r.camera_guessed ? 1 : 0); }},
   };
   return kinds;
 }
@@ -274,6 +280,43 @@ std::vector<RunSign> SignsOf(const RunResult& result) {
     if (value && std::isfinite(*value)) signs.push_back({&kind, *value});
   }
   return signs;
+}
+
+const char* ToString(HealthWord word) {
+  return word == HealthWord::kGood ? "good" : word == HealthWord::kDoubtful ? "doubtful" : "failed";
+}
+
+std::optional<RunHealth> HealthOf(const RunResult& result) {
+  if (result.appearance_only) return std::nullopt;
+  RunHealth health;
+  health.signs = SignsOf(result);
+  for (const RunSign& sign : health.signs) {
+    HealthWord word = HealthWord::kGood;
+    if (sign.kind->IsDoubtful(sign.value)) word = HealthWord::kDoubtful;
+    if (sign.kind->IsFailed(sign.value)) word = HealthWord::kFailed;
+    if (word == HealthWord::kGood) continue;
+    health.reasons.push_back(Sentence(sign));
+    health.word = std::max(health.word, word);
+  }
+  if (result.Void() && health.word != HealthWord::kFailed) {  // nothing to take a share of
+    health.word = HealthWord::kFailed;
+    health.reasons.push_back("no frame could be read; frames.bad_frames in summary.json says why");
+  }
+  if (ShowsNoFilm(result, health))
+    health.reasons.push_back("are these separate photos, and no film? `tutti loops " + result.dataset +
+                             "` finds those that show the same place, without poses");
+  return health;
+}
+
+std::string HealthText(const RunResult& result) {
+  const std::optional<RunHealth> health = HealthOf(result);
+  if (!health) return "";
+  const std::string word = ToString(health->word);
+  if (health->word == HealthWord::kGood)
+    return "\n  " + word + ": nothing that the run shows speaks against its result\n";
+  std::string text = "\n  " + word + ":\n";
+  for (const std::string& reason : health->reasons) text += "    * " + internal::Printable(reason) + "\n";
+  return text;
 }
 
 }  // namespace tutti

@@ -1,16 +1,17 @@
-// What a run shows of itself, and what a ground truth says where there is one: each sign once, with its
-// limits.
+// Whether the result of a run can be believed: what the run shows of itself, and what a ground truth says
+// where there is one, each sign once with its limits; and what they come to, in a word and with reasons.
 #pragma once
 
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "apps/run/run_result.h"
 
 namespace tutti {
 
-/// One kind of sign. summary.json, the words of a run (RunHealth), the report and `./dev bench health` use
+/// One kind of sign. summary.json, RunHealth, the report and `./dev bench health` use
 /// this list alone.
 struct SignKind {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -45,5 +46,22 @@ struct RunSign {
 
 /// Those that this run has, in the order of SignKinds. None for an image sequence without poses.
 std::vector<RunSign> SignsOf(const RunResult& result);
+
+enum class HealthWord { kGood, kDoubtful, kFailed };
+const char* ToString(HealthWord word);  ///< "good", "doubtful", "failed"
+
+/// What the run itself shows, and its ground truth if it has one.
+struct RunHealth {
+  HealthWord word = HealthWord::kGood;
+  std::vector<std::string> reasons;  ///< sentences: what is wrong, and what to do; none if good
+  std::vector<RunSign> signs;        ///< that it was judged by
+};
+
+/// Good: no sign is beyond its limit. Failed: one is beyond the outer limit, or no frame has a pose. None for
+/// an image sequence without poses.
+std::optional<RunHealth> HealthOf(const RunResult& result);
+
+/// The last lines of `tutti run` and `tutti close`; empty without health.
+std::string HealthText(const RunResult& result);
 
 }  // namespace tutti

@@ -1,27 +1,77 @@
 #include "apps/run/runner.h"
 
-#include <cstdio>
 #include <functional>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "apps/run/attempts.h"
-#include "apps/run/checkpoint.h"
 #include "apps/run/interrupt.h"
+#include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
-#include "apps/run/run_evaluation.h"
-#include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/slam_run.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
+#include "tutti/frontend/dataset.h"
 #include "tutti/slam/trajectory_closer.h"
 
 namespace tutti {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+// The path that leads there from any folder.
+std::string Absolute(const fs::path& path) {
+  if (IsCamera(path.string()) || path.string() == "none") return path.string();
+  return fs::absolute(path).lexically_normal().string();
+}
+
+}  // namespace
+
+std::string NoteOf(const RunRequest& request) {
+  nlohmann::ordered_json note;
+  note["command"] = "run";
+  note["dataset"] = Absolute(request.dataset);
+  note["config"] = request.config.string();
+  if (request.ground_truth) note["ground_truth"] = Absolute(*request.ground_truth);
+  if (request.map) note["map"] = Absolute(*request.map);
+  if (request.save_map) note["save_map"] = request.save_map->string();
+  if (request.checkpoint_s) note["checkpoint_s"] = *request.checkpoint_s;
+  note["keep"] = request.keep;
+  return note.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+RunRequest RequestOf(const std::string& note, const fs::path& file, std::string* elsewhere) {
+  const nlohmann::json json = nlohmann::json::parse(note, nullptr, false);
+  if (!json.is_object() || !json.contains("dataset"))
+    throw InputError(file.string() + ": is no checkpoint of tutti run");
+  RunRequest request;
+  try {
+    request.dataset = json.at("dataset").get<std::string>();
+    request.config = json.at("config").get<std::string>();
+    if (json.contains("ground_truth")) request.ground_truth = json["ground_truth"].get<std::string>();
+    if (json.contains("map")) request.map = json["map"].get<std::string>();
+    if (json.contains("save_map")) {
+      const std::string map = json["save_map"].get<std::string>();
+      if (elsewhere != nullptr && map != kMap) *elsewhere = map;
+      request.save_map = kMap;
+    }
+    if (json.contains("checkpoint_s")) request.checkpoint_s = json["checkpoint_s"].get<double>();
+    request.keep = json.value("keep", false);
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(file.string() + ": is no checkpoint of tutti run (" + error.what() + ")");
+  }
+  return request;
+}
+
+std::string DatasetOfNote(const std::string& note) {
+  const nlohmann::json json = nlohmann::json::parse(note, nullptr, false);
+  const bool named = json.is_object() && json.contains("dataset") && json["dataset"].is_string();
+  return named ? json["dataset"].get<std::string>() : std::string();
+}
 
 RunResult RunSlam(const RunRequest& request) { return RunSlam(request, LoadConfig(request.config)); }
 
@@ -92,7 +142,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
       internal::Say("warning: the calibration can't be right: %s; %s", f.measured.c_str(), f.advice.c_str());
     }
   }
-  SlamRun run(request, result.config, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);
+  SlamRun run(request, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);
   Attempts attempts;
   attempts.Try([&] { run.TrackAll(); });
   attempts.Try([&] { run.Count(); });

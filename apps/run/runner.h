@@ -6,7 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include "apps/run/focal_length.h"
@@ -57,7 +57,7 @@ struct RunRequest {
 /// does an exception (of an observer, for example), which is thrown on afterwards.
 RunResult RunSlam(const RunRequest& request);
 
-/// The same from a configuration in memory; `request.config` is only a name then.
+/// Runs with a configuration in memory; `request.config` is only a name then.
 RunResult RunSlam(const RunRequest& request, const RunConfig& config);
 
 /// A run that was broken off, as its checkpoint has it.
@@ -71,5 +71,18 @@ struct BrokenOffRun {
 /// The run whose checkpoint is in `out`. None if the run in `out` has finished. Throws InputError if there is
 /// neither.
 std::optional<BrokenOffRun> ResumeRequest(const std::filesystem::path& out);
+
+/// What a run was called with, as its maps and checkpoints carry it (MapInfo::note). JSON: data set,
+/// configuration's name, ground truth, and what else the configuration does not hold.
+std::string NoteOf(const RunRequest& request);
+
+/// What NoteOf made, but that a map which went elsewhere goes into the run's folder: a file that is read
+/// names no file that is written. `elsewhere`: where it went; empty: it did not. Throws InputError, with the
+/// name of the file, if it is something else.
+RunRequest RequestOf(const std::string& note, const std::filesystem::path& file,
+                     std::string* elsewhere = nullptr);
+
+/// The data set that NoteOf was given; "" if the note is something else.
+std::string DatasetOfNote(const std::string& note);
 
 }  // namespace tutti

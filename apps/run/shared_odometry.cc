@@ -1,14 +1,11 @@
 #include "apps/run/shared_odometry.h"
 
 #include <opencv2/core.hpp>
-#include <utility>
 
-#include "apps/run/attempts.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/progress.h"
-#include "apps/run/run_evaluation.h"
 #include "apps/run/run_parts.h"
 #include "apps/slam/loop_closer.h"
 #include "core/stopwatch.h"

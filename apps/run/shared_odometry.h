@@ -12,7 +12,6 @@
 #include <memory>
 #include <vector>
 
-#include "apps/run/run_observer.h"
 #include "apps/run/runner.h"
 #include "tutti/frontend/odometry.h"
 

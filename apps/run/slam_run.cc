@@ -6,26 +6,52 @@
 #include <vector>
 
 #include "apps/run/interrupt.h"
-#include "apps/run/run_note.h"
+#include "apps/slam/map_state.h"
 #include "apps/slam/trajectory_correction.h"
+#include "frontend/odometry/odometry_file.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
+namespace {
 
-SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Dataset& dataset,
-                 const GivenOdometry* given, const std::filesystem::path& out, RunResult& result)
+constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry without loops may follow
+
+}  // namespace
+
+template <class Archive>
+void State(Archive& archive, StampedPose& pose) {
+  archive(pose.stamp_s, pose.pose);
+}
+
+template <class Archive>
+void State(Archive& archive, BadFrame& bad) {
+  archive(bad.index, bad.error);
+}
+
+template <class Archive>
+void State(Archive& archive, LostStretch& lost) {
+  archive(lost.first, lost.last, lost.state, lost.reason);
+}
+
+template <class Archive>
+void State(Archive& archive, FoundFrame& found) {
+  archive(found.index, found.stamp_s, found.by_loop);
+}
+
+SlamRun::SlamRun(const RunRequest& request, const Dataset& dataset, const GivenOdometry* given,
+                 const std::filesystem::path& out, RunResult& result)
     : request_(request),
-      config_(config),
       dataset_(dataset),
       given_(given),
       result_(result),
-      planted_(config.run, config.loops.seed),
-      live_(out, dataset.Rig(), config) {
+      planted_(result.config.run, result.config.loops.seed),
+      live_(out, dataset.Rig(), result.config) {
   if (request.resume) {
     Resume(*request.resume);
   } else if (request.map) {
     GoOnIn(*request.map);
   } else {
-    slam_ = std::make_unique<SlamSystem>(Watched(config, request), dataset.Rig(), Recorder());
+    slam_ = std::make_unique<SlamSystem>(Watched(result.config, request), dataset.Rig(), Recorder());
   }
   for (const MapSession& session : slam_->Sessions()) session_offsets_.push_back(session.frame_offset);
   if (request.checkpoint_s) checkpoints_.emplace(out / kCheckpoint, *request.checkpoint_s);
@@ -47,8 +73,7 @@ SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Datas
   result_.endless = dataset.FrameSupply() != Supply::kStored;
   result_.realtime = request.realtime;
   if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
-  clock_ = request.clock ? request.clock : std::make_shared<SteadyFrameClock>();
-  playback_.emplace(*clock_);
+  playback_.emplace(request.clock ? request.clock : std::make_shared<FrameClock>());
 }
 
 void SlamRun::TrackAll() {
@@ -57,7 +82,7 @@ void SlamRun::TrackAll() {
   begin_ = Span::Clock::now();
   watch_ = internal::Stopwatch();
   cpu_begin_ = ProcessCpuSeconds();
-  Progress progress(config_.run.loops ? "slam" : "odometry", frames, Out());
+  Progress progress(result_.config.run.loops ? "slam" : "odometry", frames, Out());
   Prefetcher reader(dataset_, Reading());
   const double waited_ms = so_far_.read_wait_ms;
   while (!InterruptGuard::Requested()) {
@@ -68,7 +93,11 @@ void SlamRun::TrackAll() {
     if (!fetched) break;
     TakeFrame(*fetched, progress);
     NoteWarnings(progress);
-    progress.Update(++so_far_.next, Status());
+    std::string status = so_far_.state;
+    if (result_.config.run.loops)
+      status += "  loops " + std::to_string(CountAccepted(slam_->loops())) + "/" +
+                std::to_string(slam_->loops().size());
+    progress.Update(++so_far_.next, status);
   }
   result_.interrupted = InterruptGuard::Requested();
   if (checkpoints_) EndCheckpoints(progress);
@@ -109,7 +138,7 @@ void SlamRun::TrackUntouched() {
   if (!alone_) return;
   const std::size_t begin = alone_->last() < 0 ? 0 : so_far_.positions.at(alone_->last()) + 1;
   if (!TracksAlong() && begin < result_.frames_total)
-    result_.odometry_complete = TracksAfter() && TrackAgain(begin, result_.frames_total);
+    result_.odometry_complete = TracksTwice() && TrackAgain(begin, result_.frames_total);
   alone_->Finish();
   result_.odometry_alone_cpu_s = alone_->CpuSeconds();
 }
@@ -125,9 +154,15 @@ void SlamRun::Collect() {
   result_.global_adjustments = slam_->Report().global_adjustments;
   result_.graph = slam_->Graph();
   result_.graph_proof = slam_->Report().graph_proof;
-  if (given_ != nullptr && slam_->odometry() != nullptr) CorrectGiven();
-  FrameRange session;
-  if (FirstFrame() > 0) session.first = FirstFrame();
+  if (given_ != nullptr && slam_->odometry() != nullptr) {  // every pose of it, as the keyframes are now
+    Trajectory before;
+    for (const StampedPose& keyframe : result_.keyframe_trajectory)
+      before.push_back({keyframe.stamp_s, given_->At(keyframe.stamp_s).value()});
+    result_.trajectory_odometry = given_->trajectory();
+    result_.trajectory =
+        CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory, given_->jumps());
+  }
+  const FrameRange session = State().Session();
   result_.given_odometry = given_ != nullptr;
   result_.followed = slam_->Report().followed;
   if (given_ != nullptr) {
@@ -147,8 +182,7 @@ void SlamRun::Collect() {
     result_.cpu_s += result_.focal_length_of_map->cpu_s;
   }
   if (!alone_) return;
-  result_.trajectory_odometry =
-      BodyTrajectory(FrameTrajectory(alone_->Tracked().map(), -1, session), result_.rig);
+  result_.trajectory_odometry = BodyTrajectory(FrameTrajectory(alone_->Tracked().map(), -1, session), result_.rig);
 }
 
 void SlamRun::NoteJoining(const MapSession& own) {
@@ -157,15 +191,6 @@ void SlamRun::NoteJoining(const MapSession& own) {
   const auto position = so_far_.positions.find(*own.joined_at);
   if (position != so_far_.positions.end())
     result_.found.push_back({*own.joined_at, dataset_.Stamp(position->second), true});
-}
-
-void SlamRun::CorrectGiven() {
-  Trajectory before;
-  for (const StampedPose& keyframe : result_.keyframe_trajectory)
-    before.push_back({keyframe.stamp_s, given_->At(keyframe.stamp_s).value()});
-  result_.trajectory_odometry = given_->trajectory();
-  result_.trajectory =
-      CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory, given_->jumps());
 }
 
 TrackResult SlamRun::Track(const InputFrame& frame) {
@@ -185,10 +210,15 @@ PrefetchOptions SlamRun::Reading() {
   PrefetchOptions options;
   options.begin = so_far_.next;
   options.end = total_;
-  options.ahead = config_.run.threads > 1 ? 4 : 0;
+  options.ahead = result_.config.run.threads > 1 ? 4 : 0;
   options.stop = &InterruptGuard::Requested;
   options.recorder = Recorder();
-  options.prepare = [this](InputFrame& frame) { Extract(frame); };
+  // Features need nothing from before, so they are extracted ahead of the tracking, too.
+  options.prepare = [this](InputFrame& frame) {
+    if (slam_->odometry() == nullptr) return;
+    const ScopedSpan span(Recorder(), Lane::kReading, "extract");
+    frame.features = slam_->odometry()->Extract(frame);
+  };
   if (request_.realtime && !playback_) {  // a camera keeps its own time
     options.ahead = 1;
     options.newest = true;
@@ -196,25 +226,11 @@ PrefetchOptions SlamRun::Reading() {
   return options;
 }
 
-void SlamRun::Extract(InputFrame& frame) {
-  if (slam_->odometry() == nullptr) return;
-  const ScopedSpan span(Recorder(), Lane::kReading, "extract");
-  frame.features = slam_->odometry()->Extract(frame);
-}
-
 void SlamRun::AwaitFrame(Prefetcher& frames) {
   std::size_t next = so_far_.next;
   while (next + 1 < Listed() && playback_->Due(dataset_.Stamp(next + 1))) ++next;
   frames.SkipTo(next);
   if (next < Listed()) playback_->Reach(dataset_.Stamp(next));
-}
-
-bool SlamRun::TracksAlong() const {
-  return config_.run.odometry_pass && !request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
-}
-
-bool SlamRun::TracksAfter() const {
-  return config_.run.odometry_pass && request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
 }
 
 bool SlamRun::TrackAgain(std::size_t begin, std::size_t end) {
@@ -267,7 +283,8 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
     const auto pause = pauses_.Next(fetched.read.frame->index, fetched.read.frame->stamp_s);
     if (pause) progress.Note("tutti: warning: " + *pause, "frames come long after the one before them");
     CountDepth(fetched.read, progress);
-    if (!config_.dataset.mask.empty() && fetched.read.frame->mask.empty()) ++result_.frames_without_mask;
+    if (!result_.config.dataset.mask.empty() && fetched.read.frame->mask.empty())
+      ++result_.frames_without_mask;
     TrackOne(*fetched.read.frame);
     result_.latency_ms.push_back(fetched.prepare_ms + result_.frame_ms.back());
     if (alone_ && TracksAlong()) alone_->Track(*fetched.read.frame);
@@ -314,13 +331,105 @@ void SlamRun::TrackOne(const InputFrame& frame) {
   result_.lost.back().last = frame.index;
 }
 
-std::string SlamRun::Status() const {
-  std::string status = so_far_.state;
-  if (config_.run.loops) {
-    const std::vector<Loop>& loops = slam_->loops();
-    status += "  loops " + std::to_string(CountAccepted(loops)) + "/" + std::to_string(loops.size());
+// A run on disk: its checkpoints, and how it goes on from one, or in the map of another.
+
+template <class Archive>
+void SlamRun::State(Archive& archive) {
+  bool has_alone = alone_ != nullptr;
+  std::int64_t alone_last = has_alone ? alone_->last() : -1;
+  Trajectory live = live_.trajectory();
+  std::map<std::string, std::string> collected;
+  if constexpr (!Archive::kReading) {
+    for (const auto& observer : request_.observers) {
+      if (*observer->Name() != '\0') collected[observer->Name()] = observer->Save();
+    }
   }
-  return status;
+  archive(so_far_, planted_, live, alone_last, has_alone, collected);
+  archive(result_.frames_lost, result_.frames_without_mask, result_.frames_without_depth, result_.bad,
+          result_.bad_depth, result_.lost, result_.found, result_.frame_ms, result_.latency_ms,
+          result_.frame_inliers, result_.frames_by_grey_values);
+  if constexpr (Archive::kReading) {
+    if (has_alone) resumed_alone_ = alone_last;
+    resumed_live_ = std::move(live);
+    for (const auto& observer : request_.observers) {
+      const auto found = collected.find(observer->Name());
+      if (found != collected.end()) observer->Load(found->second, request_.resume->string());
+    }
+  }
+}
+
+void SlamRun::WriteCheckpoint() {
+  so_far_.wall_s = WallSeconds();
+  so_far_.cpu_s = CpuSeconds();
+  std::optional<Odometry> alone;
+  if (alone_) alone = alone_->Tracked();
+  const auto write = [run = StateOf(*this), alone = std::move(alone)](const MapSink& sink) {
+    sink(kRunSection, run);
+    if (alone) OdometryFile::Save(*alone, sink);
+  };
+  checkpoints_->Begin(slam_->Snapshot(NoteOf(request_)), write);
+}
+
+void SlamRun::EndCheckpoints(Progress& progress) {
+  checkpoints_->Wait();
+  if (!result_.interrupted) return;
+  WriteCheckpoint();
+  checkpoints_->Wait();
+  if (const auto problem = checkpoints_->TakeProblem()) {
+    progress.Note("tutti: warning: " + *problem);
+  } else {
+    progress.Note("tutti: go on with: tutti run --resume " + request_.out.string());
+  }
+}
+
+void SlamRun::GoOnIn(const std::filesystem::path& map) {
+  MapInfo info = ReadMapInfo(map);
+  if (!info.rig.calibrated || !result_.rig.calibrated)
+    throw InputError(
+        map.string() +
+        ": a recording can only go on in a map with poses, which needs calibrated cameras on both sides");
+  if (!info.config.run.loops || !result_.config.run.loops)
+    throw InputError(map.string() +
+                     ": without loop closure (run.loops, --no-loops) nothing would connect a recording with "
+                     "the map; both need it");
+  info.config = Watched(result_.config, request_);
+  slam_ = LoadMap(map, info, Recorder());
+  try {
+    slam_->BeginSession(result_.rig);
+  } catch (const InputError& error) {
+    throw InputError(map.string() + ": " + result_.dataset + " can't go on in it: " + error.what());
+  }
+  live_.Skip(LoopsBefore());
+}
+
+std::size_t SlamRun::LoopsBefore() const {
+  const std::int64_t first = FirstFrame();
+  return static_cast<std::size_t>(std::count_if(slam_->loops().begin(), slam_->loops().end(),
+                                                [&](const Loop& l) { return l.query < first; }));
+}
+
+void SlamRun::Resume(const std::filesystem::path& checkpoint) {
+  MapInfo info = ReadMapInfo(checkpoint);
+  if (StateOf(info.rig) != StateOf(result_.rig))
+    throw InputError(checkpoint.string() + ": is of another camera than the data set has by now");
+  info.config = Watched(result_.config, request_);
+  slam_ = LoadMap(checkpoint, info, Recorder(), [this](internal::SectionReader& file) {
+    ReadState(file, kRunSection, this);
+    if (!resumed_alone_) return;
+    Odometry alone(result_.config.odometry, result_.rig);
+    OdometryFile::Load(&file, &alone);
+    alone_ = std::make_unique<OdometryAlone>(alone, *resumed_alone_, AloneBeside());
+  });
+  live_.Skip(LoopsBefore());
+  live_.Resume(std::move(resumed_live_), slam_->loops());
+  before_ = so_far_;
+  for (const auto& [index, position] : so_far_.positions) {
+    if (position >= dataset_.Size() || dataset_.Number(position) != index)
+      throw InputError(checkpoint.string() + ": is of another data set than " + result_.dataset +
+                       " holds by now");
+  }
+  const std::size_t next = so_far_.next;
+  result_.resumed_from_frame = next < dataset_.Size() ? dataset_.Number(next) : info.last_frame + 1;
 }
 
 }  // namespace tutti

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "apps/export/map_export.h"
-#include "apps/run/run_note.h"
+#include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/run/run_note.h"
+#include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/map_prune.h"

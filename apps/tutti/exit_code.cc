@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "apps/run/run_health.h"
+#include "apps/run/run_signs.h"
 #include "apps/run/run_parts.h"
 #include "apps/tutti/checks.h"
 #include "core/terminal.h"

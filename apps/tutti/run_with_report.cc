@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "apps/report/comparison_report.h"
 #include "apps/report/page.h"
 #include "apps/report/run_report.h"
 #include "apps/tutti/files.h"

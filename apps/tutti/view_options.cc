@@ -1,6 +1,7 @@
 #include "apps/tutti/view_options.h"
 
 #include <cstdio>
+#include <utility>
 
 #include "apps/tutti/checks.h"
 #include "core/terminal.h"
@@ -27,14 +28,14 @@ void AddViewOptions(CLI::App& command, ViewOptions& options) {
       ->capture_default_str();
 }
 
-std::shared_ptr<LiveView> StartView(const CLI::App& command, const ViewOptions& options, bool quiet) {
+std::shared_ptr<RunObserver> StartView(const CLI::App& command, const ViewOptions& options, bool quiet) {
   if (!options.view && command.count("--view-address") == 0) return nullptr;
   const std::string problem = options.live.Validate();
   if (!problem.empty()) throw InputError("--view: " + problem);
-  auto view = std::make_shared<LiveView>(options.live);
+  LiveView view = OpenLiveView(options.live);
   const bool known = options.live.port != 0 && command.count("--view-address") == 0;  // as it was asked for
-  if (!quiet || !known) internal::Say("look at %s", view->Url().c_str());
-  return view;
+  if (!quiet || !known) internal::Say("look at %s", view.url.c_str());
+  return std::move(view.observer);
 }
 
 }  // namespace tutti::cli

@@ -18,6 +18,6 @@ void AddViewOptions(CLI::App& command, ViewOptions& options);
 
 /// Serves the page and prints its address (`quiet`: only one that can't be known before: a free port, or a
 /// token); null: it was not asked for. Throws InputError if it can't.
-std::shared_ptr<LiveView> StartView(const CLI::App& command, const ViewOptions& options, bool quiet);
+std::shared_ptr<RunObserver> StartView(const CLI::App& command, const ViewOptions& options, bool quiet);
 
 }  // namespace tutti::cli

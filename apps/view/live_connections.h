@@ -1,11 +1,25 @@
-// Which connections to the live view are open.
+// Who may look at the live view, and which connections to it are open.
 #pragma once
 
 #include <condition_variable>
 #include <map>
 #include <mutex>
+#include <string>
 
 namespace tutti::view {
+
+/// 127.0.0.0/8, ::1 and localhost.
+bool IsLoopback(const std::string& address);
+
+/// 128 random bits from the system, in hex.
+std::string RandomToken();
+
+/// True if both are the same; takes as long for any two of one length.
+bool SameToken(const std::string& a, const std::string& b);
+
+/// True if the header Host names this machine: another site's name that was made to point here (DNS
+/// rebinding) does not.
+bool NamesLoopback(const std::string& host_header);
 
 /// Bounds what strangers can hold open. Thread-safe. Whoever serves a connection calls Enter, Open, Asked
 /// (its request is complete) and Leave, in this order; whoever accepts them calls MakeRoom before the next.

@@ -1,13 +1,13 @@
-#include "apps/view/live_message.h"
-
+// The state of a run as the page reads it.
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <unordered_map>
 
-#include "apps/report/base64.h"
-#include "apps/view/live_tracks.h"
+#include "apps/report/page.h"
+#include "apps/view/live_server.h"
 
 namespace tutti::view {
 namespace {
@@ -21,18 +21,8 @@ double Short(double value, double unit = 1000) { return std::round(value * unit)
 
 Json Position(const Eigen::Vector3d& p) { return {Short(p.x()), Short(p.y()), Short(p.z())}; }
 
-const char* WordOf(LiveSpot::Kind kind) {
-  switch (kind) {
-    case LiveSpot::Kind::kBeyond:
-      return "beyond";
-    case LiveSpot::Kind::kRecognised:
-      return "recognised";
-    case LiveSpot::Kind::kJoined:
-      return "joined";
-    default:
-      return "located";
-  }
-}
+constexpr const char* kSpotWords[] = {"located", "beyond", "recognised",
+                                      "joined"};  // in the order of the kinds
 
 // Each track: x, y of now, of the frame before that shows it, ...
 Json TracksJson(const LiveFrame& frame, double scale) {
@@ -66,6 +56,24 @@ Json FrameJson(const LiveFrame& frame) {
 
 }  // namespace
 
+std::vector<LiveTrack> TracksOf(const LiveTrail& trail, std::size_t most) {
+  std::vector<LiveTrack> tracks;
+  if (trail.empty() || most == 0) return tracks;
+  const std::size_t step = std::max<std::size_t>(1, (trail.front()->size() + most - 1) / most);
+  std::unordered_map<int, std::size_t> track_of;  // landmark -> its track
+  for (const SeenLandmark& seen : *trail.front()) {
+    if (static_cast<std::size_t>(seen.landmark) % step != 0 || tracks.size() == most) continue;
+    if (track_of.emplace(seen.landmark, tracks.size()).second) tracks.push_back({seen.pixel});
+  }
+  for (std::size_t frame = 1; frame < trail.size(); ++frame) {
+    for (const SeenLandmark& seen : *trail[frame]) {
+      const auto track = track_of.find(seen.landmark);
+      if (track != track_of.end()) tracks[track->second].push_back(seen.pixel);
+    }
+  }
+  return tracks;
+}
+
 std::string LiveMessage(const LiveNews& news) {
   Json json = {{"paused", news.paused},         {"standing", news.standing},
                {"finished", news.finished},     {"total", news.total},
@@ -89,7 +97,8 @@ std::string LiveMessage(const LiveNews& news) {
   }
   json["spots"] = Json::array();
   for (const LiveSpot& spot : news.spots)
-    json["spots"].push_back({WordOf(spot.kind), spot.frame, spot.keyframe, Position(spot.position)});
+    json["spots"].push_back(
+        {kSpotWords[static_cast<int>(spot.kind)], spot.frame, spot.keyframe, Position(spot.position)});
   json["events"] = Json::array();
   for (const LiveEvent& event : news.events) {
     Json e = {{"text", event.text}};

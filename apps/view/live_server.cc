@@ -6,15 +6,18 @@
 #include <chrono>
 #include <thread>
 
-#include "apps/view/live_access.h"
 #include "apps/view/live_connections.h"
-#include "apps/view/live_message.h"
-#include "apps/view/live_page.h"
 #include "apps/view/live_stream.h"
-#include "apps/view/live_threads.h"
 #include "tutti/core/error.h"
 
-namespace tutti::view {
+namespace tutti {
+
+namespace assets {  // made by CMake
+std::string ViewHead();
+std::string ViewScript();
+}  // namespace assets
+
+namespace view {
 namespace {
 
 constexpr int kMostViewers = 4;
@@ -115,7 +118,9 @@ class LiveServer::Impl {
       return httplib::Server::HandlerResponse::Handled;
     });
     server_.Get("/", [](const httplib::Request&, httplib::Response& response) {
-      response.set_content(LivePage(), "text/html; charset=utf-8");
+      response.set_content(
+          assets::ViewHead() + "<script>" + assets::ViewScript() + "</script>\n</body>\n</html>\n",
+          "text/html; charset=utf-8");
     });
     server_.Get("/events",
                 [this](const httplib::Request&, httplib::Response& response) { Stream(response); });
@@ -226,4 +231,24 @@ LiveServer::LiveServer(const LiveViewOptions& options, LiveState& state)
 LiveServer::~LiveServer() = default;
 std::string LiveServer::Url() const { return impl_->Url(); }
 
-}  // namespace tutti::view
+}  // namespace view
+
+std::string LiveViewOptions::Validate() const {
+  if (address.empty()) return "the address to listen at must not be empty";
+  if (port < 0 || port > 65535) return "the port must be 0 to 65535";
+  if (!(abandoned_s >= 0)) return "abandoned_s must be 0 s or more";
+  if (!(idle_s >= 0)) return "the time to wait for a viewer must be 0 s or more";
+  return {};
+}
+
+LiveView OpenLiveView(const LiveViewOptions& options) {
+  struct Opened {
+    explicit Opened(const LiveViewOptions& given) : state(given), server(given, state) {}
+    view::LiveState state;
+    view::LiveServer server;  // last: serves the rest
+  };
+  const auto opened = std::make_shared<Opened>(options);
+  return {std::shared_ptr<RunObserver>(opened, &opened->state), opened->server.Url()};
+}
+
+}  // namespace tutti

@@ -18,10 +18,18 @@ std::vector<LivePlace> PlacesOf(const RunState& state) {
   for (const int id : odometry.map().KeyframeIds()) {
     if (id >= state.end_of_map) break;
     const std::int64_t frame = odometry.map().keyframe(id).frame_index;
-    places.push_back({id, frame, odometry.map().keyframe(id).piece, state.SessionOf(frame),
-                      odometry.map().keyframe(id).T_world_camera});
+    places.push_back(
+        {id, frame, odometry.map().keyframe(id).piece, state.SessionOf(frame), odometry.map().keyframe(id).T_world_camera});
   }
   return places;
+}
+
+std::vector<LiveLoop> LoopsOf(const RunState& state) {
+  std::vector<LiveLoop> loops;
+  for (const Loop& record : state.loops) {
+    if (record.verified) loops.push_back({record.query, record.candidate, record.accepted});
+  }
+  return loops;
 }
 
 std::string StateWord(const TrackResult& track, const RunState& state) {
@@ -61,20 +69,20 @@ void LiveState::AddEvent(LiveEvent event) {
   if (events_.size() > kMostEvents) events_.pop_front();
 }
 
-std::vector<LiveLoop> LiveState::LoopsOf(const RunState& state) {
-  std::vector<LiveLoop> loops;
-  for (const Loop& record : state.loops) {
-    if (record.verified) loops.push_back({record.query, record.candidate, record.accepted()});
-  }
-  return loops;
-}
-
-void LiveState::SetTotal(std::size_t frames) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+void LiveState::OnStart(const CameraRig&, std::size_t frames) {
+  const double end = internal::SteadySeconds() + options_.idle_s;
+  std::unique_lock<std::mutex> lock(mutex_);
   now_.total = frames;
+  while (viewers_ == 0 && internal::SteadySeconds() < end && !InterruptGuard::Requested())
+    changed_.wait_for(lock, std::chrono::milliseconds(50));
 }
 
-void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) {
+void ExtendTrail(std::vector<SeenLandmark> seen, LiveTrail* trail) {
+  trail->push_front(std::make_shared<const std::vector<SeenLandmark>>(std::move(seen)));
+  if (trail->size() > kTrailFrames) trail->pop_back();
+}
+
+void LiveState::OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) {
   LiveFrame next;
   next.index = frame.index;
   next.stamp_s = frame.stamp_s;
@@ -111,12 +119,15 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   corrections_seen_ = state.corrections;
   new_keyframe_ = false;
   state_seen_ = next.state;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  next.number = now_.frame.number + 1;
-  now_.frame = std::move(next);
-  if (places) now_.places = places;
-  if (loops) now_.loops = loops;
-  Changed();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    next.number = now_.frame.number + 1;
+    now_.frame = std::move(next);
+    if (places) now_.places = places;
+    if (loops) now_.loops = loops;
+    Changed();
+  }
+  WaitWhilePaused(options_.abandoned_s);
 }
 
 void LiveState::SetMap(const RunState& state) {
@@ -161,7 +172,7 @@ void LiveState::AddSpot(const LiveFrame& frame, const RunState& state) {
   if (spots_.size() > kMostSpots) spots_.pop_front();
 }
 
-void LiveState::SetKeyframe(int keyframe, const RunState& state) {
+void LiveState::OnKeyframe(const InputFrame&, int keyframe, const RunState& state) {
   new_keyframe_ = true;
   AddPoints(keyframe, *state.odometry);
 }
@@ -176,7 +187,7 @@ void LiveState::AddPoints(int keyframe, const Odometry& odometry) {
   if (points_.size() > kMostPoints) points_.pop_front();
 }
 
-void LiveState::AddDetection(const LoopResult& result) {
+void LiveState::OnDetection(const LoopResult& result) {
   LiveEvent event;
   event.query = result.query;
   for (const MemberOpinion& member : result.members)
@@ -199,10 +210,8 @@ void LiveState::AddDetection(const LoopResult& result) {
 }
 
 void LiveState::Log(const std::string& text) {
-  LiveEvent event;
-  event.text = text;
   const std::lock_guard<std::mutex> lock(mutex_);
-  AddEvent(std::move(event));
+  AddEvent({0, text, -1, {}});
   Changed();
 }
 
@@ -219,9 +228,7 @@ void LiveState::WaitWhilePaused(double abandoned_s) {
   while (now_.paused && steps_ == 0 && !closed_ && !InterruptGuard::Requested()) {
     if (viewers_ == 0 && internal::SteadySeconds() - last_viewer_s_ > abandoned_s) {
       now_.paused = false;
-      LiveEvent event;
-      event.text = "nobody looks any more: the run goes on";
-      AddEvent(std::move(event));
+      AddEvent({0, "nobody looks any more: the run goes on", -1, {}});
       Changed();
       break;
     }
@@ -233,13 +240,6 @@ void LiveState::WaitWhilePaused(double abandoned_s) {
   }
   now_.standing = false;
   if (steps_ > 0) --steps_;
-}
-
-void LiveState::WaitForViewer(double seconds) {
-  const double end = internal::SteadySeconds() + seconds;
-  std::unique_lock<std::mutex> lock(mutex_);
-  while (viewers_ == 0 && internal::SteadySeconds() < end && !InterruptGuard::Requested())
-    changed_.wait_for(lock, std::chrono::milliseconds(50));
 }
 
 void LiveState::AddViewer(int change) {

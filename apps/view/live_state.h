@@ -9,12 +9,28 @@
 #include <mutex>
 #include <opencv2/core.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/run/run_observer.h"
-#include "apps/view/live_tracks.h"
+#include "apps/view/live_view.h"
 
 namespace tutti::view {
+
+/// What each of the last frames shows of the map, newest first, for the tails of the features that the
+/// odometry follows; copies share it.
+using LiveTrail = std::deque<std::shared_ptr<const std::vector<SeenLandmark>>>;
+constexpr std::size_t kTrailFrames = 11;  ///< the newest one and those that the tails are of
+
+/// Puts the newest frame before the others; the oldest one falls out.
+void ExtendTrail(std::vector<SeenLandmark> seen, LiveTrail* trail);
+
+/// Pixels of one landmark, newest first: in the newest frame, then in those before that show it.
+using LiveTrack = std::vector<cv::Point2f>;
+
+/// Tracks of landmarks in the newest frame, at most `most`. Which ones depends on their ids, so that they
+/// stay the same from frame to frame as far as possible.
+std::vector<LiveTrack> TracksOf(const LiveTrail& trail, std::size_t most);
 
 /// The last frame.
 struct LiveFrame {
@@ -91,26 +107,28 @@ struct LiveCursor {
   std::uint64_t version = 0, points = 0, spots = 0, events = 0;
 };
 
-/// Thread-safe. Bounded: old events, points and spots fall out. Locks are held for copies of pointers alone.
-class LiveState {
+/// What is left of a run for those who look, by the thread that tracks. Thread-safe. Bounded: old events,
+/// points and spots fall out. Locks are held for copies of pointers alone.
+class LiveState : public RunObserver {
  public:
   static constexpr std::size_t kMostEvents = 400;
   static constexpr std::size_t kMostPoints = 1500;  ///< keyframes with points
   static constexpr std::size_t kPointsPerKeyframe = 40;
   static constexpr std::size_t kMostSpots = 5000;
 
+  explicit LiveState(LiveViewOptions options = {}) : options_(std::move(options)) {}
+
   // ---- the run's side
-  void SetTotal(std::size_t frames);
-  void SetFrame(const InputFrame& frame, const TrackResult& track, const RunState& state);
-  void SetKeyframe(int keyframe, const RunState& state);
-  void AddDetection(const LoopResult& result);
+  void OnStart(const CameraRig& rig, std::size_t frames) override;
+  void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
+  void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override;
+  void OnDetection(const LoopResult& result) override;
+  void OnEnd(const RunState&) override { Finish(); }
   void Log(const std::string& text);
   void Finish();
   /// Returns when the run may go on: it is not paused, a step was asked for, nobody has looked for
   /// `abandoned_s` (then it is no longer paused), or the run is interrupted.
   void WaitWhilePaused(double abandoned_s);
-  /// Waits until somebody looks, at most so long.
-  void WaitForViewer(double seconds);
 
   // ---- the server's side
   void AddViewer(int change);
@@ -125,14 +143,14 @@ class LiveState {
   bool Closed() const;
 
  private:
-  void Changed();  // with mutex_ held
-  std::vector<LiveLoop> LoopsOf(const RunState& state);
+  void Changed();                  // with mutex_ held
   void AddEvent(LiveEvent event);  // with mutex_ held
   void AddPoints(int keyframe, const Odometry& odometry);
   // The map that the run began with.
   void SetMap(const RunState& state);
   void AddSpot(const LiveFrame& frame, const RunState& state);
 
+  LiveViewOptions options_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   LiveNews now_;
@@ -144,7 +162,7 @@ class LiveState {
   int steps_ = 0;
   bool closed_ = false;
   double last_viewer_s_ = 0;
-  // Of the tracking thread alone.
+  // What follows belongs to the tracking thread alone.
   bool begun_ = false, joined_ = false;
   std::size_t loops_seen_ = 0, accepted_seen_ = 0;
   int corrections_seen_ = 0;

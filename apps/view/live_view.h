@@ -9,8 +9,9 @@
 namespace tutti {
 
 struct LiveViewOptions {
-  std::string address = "127.0.0.1";  ///< to listen at; another one than loopback needs the token of Url()
-  int port = 8077;                    ///< 0: any free one
+  std::string address =
+      "127.0.0.1";         ///< to listen at; another one than loopback needs the token of LiveView::url
+  int port = 8077;         ///< 0: any free one
   double abandoned_s = 3;  ///< a run that is paused goes on when nobody has looked at it for this long [s]
   double idle_s = 0;       ///< wait at most this long for the first viewer before the first frame [s]
 
@@ -18,36 +19,19 @@ struct LiveViewOptions {
   std::string Validate() const;
 };
 
-/// False if tutti was built without cpp-httplib.
-bool LiveViewAvailable();
+/// A run that is looked at.
+struct LiveView {
+  std::shared_ptr<RunObserver> observer;  ///< serves the page as long as it lives
+  std::string url;                        ///< to open in a browser, with the token if there is one
+};
 
-/// Serves one page and its data (server-sent events), and nothing else. The tracking thread only leaves the
-/// newest state here; images are encoded and sent by the server's threads, and what a browser is too slow for
-/// is left out. Pausing holds the run up as long as somebody looks.
+/// Serves one page and its data (server-sent events) from now on, and nothing else. The tracking thread only
+/// leaves the newest state; images are encoded and sent by the server's threads, and what a browser is too
+/// slow for is left out. Pausing holds the run up as long as somebody looks. Throws InputError if the address
+/// or the port can't be used, or tutti was built without cpp-httplib.
 ///
 /// Loopback: requests must name localhost (no other site's page can be made to ask), and commands need a
 /// header that other sites can't send. Elsewhere: everything needs a random token of 128 bits.
-class LiveView : public RunObserver {
- public:
-  /// Listens from now on. Throws InputError if the address or the port can't be used, or tutti was built
-  /// without cpp-httplib.
-  explicit LiveView(const LiveViewOptions& options);
-  ~LiveView() override;
-  LiveView(const LiveView&) = delete;
-  LiveView& operator=(const LiveView&) = delete;
-
-  /// What to open in a browser, with the token if there is one.
-  std::string Url() const;
-
-  void OnStart(const CameraRig& rig, std::size_t frames) override;
-  void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
-  void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override;
-  void OnDetection(const LoopResult& result) override;
-  void OnEnd(const RunState& state) override;
-
- private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
-};
+LiveView OpenLiveView(const LiveViewOptions& options);
 
 }  // namespace tutti

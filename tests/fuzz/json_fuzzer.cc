@@ -2,7 +2,7 @@
 // chooses: a run's summary.json, or what a map says of the run that made it.
 #include <string>
 
-#include "apps/run/run_note.h"
+#include "apps/run/runner.h"
 #include "apps/tutti/comparison.h"
 #include "apps/tutti/files.h"
 #include "tests/fuzz/memory_file.h"

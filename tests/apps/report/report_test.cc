@@ -6,8 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/report/comparison_report.h"
-#include "apps/report/detection_log.h"
 #include "apps/report/page.h"
 #include "apps/report/run_report.h"
 #include "tests/apps/tiny_town.h"

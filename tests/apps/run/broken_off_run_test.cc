@@ -1,5 +1,4 @@
 // A run that an exception breaks off: what there is by then is written, and an earlier result stays.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <memory>

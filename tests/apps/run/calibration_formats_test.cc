@@ -84,6 +84,9 @@ TEST(CalibrationFormats, OfOneFisheyeIsTheSameCameraInEveryFormat) {
        "Camera.fx:295\nCamera.fy:295\nCamera.cx:159.5\nCamera.cy:119.5\n" + terms + size +
            "Camera.model: fisheye\n",
        kFlat + terms + "Camera.width: 320\nCamera.height: 240\nCamera.type: \"KannalaBrandt8\"\n",
+       "Camera.type: KannalaBrandt8\nCamera1.fx: 295\nCamera1.fy: 295\nCamera1.cx: 159.5\nCamera1.cy: 119.5\n"
+       "Camera1.k1: 0.1\nCamera1.k2: -0.05\nCamera1.k3: 0.02\nCamera1.k4: -0.01\nCamera.width: 320\n"
+       "Camera.height: 240\n",
        "Camera:\n  model: fisheye\n  fx: 295\n  fy: 295\n  cx: 159.5\n  cy: 119.5\n  k1: 0.1\n  k2: -0.05\n"
        "  k3: 0.02\n  k4: -0.01\n  cols: 320\n  rows: 240\n",
        "cam0: {camera_model: pinhole, distortion_model: equidistant, distortion_coeffs: [0.1, -0.05, 0.02, "
@@ -133,6 +136,12 @@ TEST(CalibrationFormats, OfOneLensIsTheSameCameraInEveryFormat) {
        R"({"camera_type": "pinhole-radtan8", "intrinsics": {"fx": 295, "fy": 295, "cx": 159.5, "cy": 119.5,
           "k1": 0.1, "k2": -0.05, "p1": 0.001, "p2": -0.002, "k3": 0, "k4": 0, "k5": 0, "k6": 0},
           "resolution": [320, 240]})",
+       "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, 0.1,\n         0.0, 1.0, "
+       "0.0, "
+       "0.2,\n         0.0, 0.0, 1.0, 0.3,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [320, "
+       "240]\n"
+       "camera_model: pinhole\nintrinsics: [295, 295, 159.5, 119.5] #fu, fv, cu, cv\ndistortion_model: "
+       "radial-tangential\ndistortion_coefficients: [0.1, -0.05, 0.001, -0.002]\n",
        "cameras:\n- {T_SC: [1], image_dimension: [320, 240], distortion_coefficients: [0.1, -0.05, 0.001, "
        "-0.002], distortion_type: radialtangential, focal_length: [295, 295], principal_point: [159.5, "
        "119.5]}\n",
@@ -153,6 +162,11 @@ TEST(CalibrationFormats, OfAPinholeIsTheSameCameraInEveryFormat) {
       {R"({"width": 320, "height": 240, "intrinsic_matrix": [295, 0, 0, 0, 295, 0, 159.5, 119.5, 1]})",
        R"({"intrinsic": {"width": 320, "height": 240, "intrinsic_matrix": [295, 0, 0, 0, 295, 0, 159.5, 119.5,
           1]}, "extrinsic": [1, 0, 0, 0]})",
+       kFlat + "Camera.k1: 0.0\nCamera.cols: 320\nCamera.rows: 240\n",
+       "image_width: 320\nimage_height: 240\ncamera_name: front\ncamera_matrix: " + kKMatrix +
+           "distortion_model: plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, "
+           "0]}\n",
+       "camera:\n  width: 320\n  height: 240\n  fx: 295\n  fy: 295\n  cx: 159.5\n  cy: 119.5\n",
        realsense + "coeffs: [0, 0, 0, 0, 0]\n", "1 PINHOLE 320 240 295 295 160 120\n",
        R"({"camera": {"w": 320, "h": 240, "fx": 295, "fy": 295, "cx": 159.5, "cy": 119.5, "scale": 6553.5}})",
        "cam:\n  H: 240\n  W: 320\n  fx: 295\n  fy: 295\n  cx: 159.5\n  cy: 119.5\n  png_depth_scale: 5000\n",
@@ -210,6 +224,25 @@ TEST(CalibrationFormats, WithAFisheyeOfNoTermsIsNoPinhole) {
   EXPECT_EQ(c.camera.distortion, Distortion::kEquidistant);
 }
 
+TEST(CalibrationFormats, OfOpenCvHasFiveTerms) {
+  const Calibration c =
+      ReadText("%YAML:1.0\n---\n" + kKOfOpenCv +
+               "distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n"
+               "   data: [ 0.2, -0.4, 0.001, 0.002, 0.1 ]\n");
+  EXPECT_EQ(c.camera.coefficients, (DistortionCoefficients{0.2, -0.4, 0.001, 0.002, 0.1}));
+}
+
+TEST(CalibrationFormats, AreNamed) {
+  for (const auto& [text, name] :
+       {std::pair(kFlat, "ORB-SLAM"),
+        {kFlat + "Camera.model: perspective\n", "OpenVSLAM"},
+        {kKOfOpenCv, "OpenCV"},
+        {"intrinsics: [295, 295, 159.5, 119.5]\n", "EuRoC"},
+        {"camera: {width: 320, height: 240, fx: 295, fy: 295, cx: 159.5, cy: 119.5}\n", "tutti"},
+        {"camera_name: front\ncamera_matrix: " + kKMatrix, "ROS"}})
+    EXPECT_EQ(ReadText(text).format, name);
+}
+
 TEST(CalibrationFormats, WithSeveralCamerasSaysWhichItTook) {
   EXPECT_EQ(ReadText("2 PINHOLE 320 240 295 295 160 120\n3 PINHOLE 5 5 1 1 1 1\n").format,
             "COLMAP, camera 2, the first of 2");
@@ -241,6 +274,12 @@ TEST(CalibrationFormats, HasTheScaleOfDepthAndTheBaseline) {
             1000);
   EXPECT_EQ(ReadText(kFlat + "depthmap_factor: 5000\n").depth_units_per_m, 5000);
   EXPECT_EQ(ReadText(kFlat + "Camera.focal_x_baseline: 29.5\n").baseline_m, 0.1);
+  EXPECT_EQ(ReadText(kFlat + "Camera.bf: 29.5\n").baseline_m, 0.1);
+  EXPECT_EQ(
+      ReadText("camera: {width: 320, height: 240, fx: 295, fy: 295, cx: 159.5, cy: 119.5, baseline_m: 0.1}\n")
+          .baseline_m,
+      0.1);
+  EXPECT_EQ(ReadText("intrinsics: [295, 295, 159.5, 119.5]\nrate_hz: 20\n").rate_hz, 20);
   EXPECT_NEAR(
       ReadText("P0: 295 0 159.5 0 0 295 119.5 0 0 0 1 0\nP1: 295 0 159.5 -29.5 0 295 119.5 0 0 0 1 0\n")
           .baseline_m,

@@ -15,7 +15,6 @@
 #include "tests/support/recording.h"
 #include "tests/support/small_room.h"
 #include "tests/support/test_data.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -88,7 +87,7 @@ TEST(FocalLength, IsTheSameAgain) {
   EXPECT_EQ(once.sigma, again.sigma);
 }
 
-// Of a camera that turns by nearly half of its view from frame to frame at first, the first keyframes see
+// A camera turns by nearly half of its view from frame to frame at first: the first keyframes see
 // nothing that three of them see.
 TEST(LensCheck, OfAMapWhoseFirstKeyframesSeeNothingOfTheRest) {
   SyntheticOptions options = testing::SmallRgbdRoom(320, 240);

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
-#include <set>
 #include <sstream>
 
 #include "tests/apps/tutti/executable.h"
@@ -84,7 +83,7 @@ class FramesWithoutDepth : public ::testing::Test {
   static double AteOf(const nlohmann::json& summary) {
     return summary["evaluation"]["slam"]["ate_rmse_m"].get<double>();
   }
-  // Of a run on the whole room, made once.
+  // The summary of a run on the whole room, made once.
   const nlohmann::json& Complete() const {
     static const nlohmann::json complete = [this] {
       EXPECT_EQ(Run().status, 0);

@@ -31,10 +31,9 @@ TEST(LiveFiles, EveryLineIsThereAtOnce) {
   loops.emplace_back();
   loops.back().query = 7;
   live.Add(1, track, state);
-  EXPECT_EQ(ReadAll(folder / kLiveTrajectory),
-            header +
-                "1.000000000 2.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 "
-                "1.000000000\n");
+  EXPECT_EQ(ReadAll(folder / kLiveTrajectory), header +
+                                                   "1.000000000 2.000000000 0.000000000 0.000000000 "
+                                                   "0.000000000 0.000000000 0.000000000 1.000000000\n");
   EXPECT_THAT(ReadAll(folder / kLiveLoops), HasSubstr("\n7,-1,"));
   const std::string before = ReadAll(folder / kLiveLoops);
   live.Add(2, track, state);

@@ -1,4 +1,5 @@
-// Real time without a real clock: how many frames are dropped is known exactly.
+// Real time without a real clock: how many frames are dropped is known exactly. Pauses of a recording.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,8 +26,7 @@ class SlowMachineClock : public FrameClock {
 };
 
 TEST(Playback, FramesAreDueByTheDistanceOfTheirStamps) {
-  SlowMachineClock clock(0);
-  Playback playback(clock);
+  Playback playback(std::make_shared<SlowMachineClock>(0));
   EXPECT_FALSE(playback.Due(5.0));  // nothing is due before the play
   playback.Reach(5.0);
   EXPECT_TRUE(playback.Due(5.0));
@@ -74,6 +74,22 @@ TEST(Realtime, DropsWhatItCanNotFollowAndCountsIt) {
   EXPECT_EQ(testing::ReadAll(folder / "slow" / "trajectory.txt"),
             testing::ReadAll(folder / "again" / "trajectory.txt"));
   EXPECT_EQ(again.frames_dropped, slow.frames_dropped);
+}
+
+TEST(StampPauses, OnlyWhereTheRecordingStops) {
+  StampPauses pauses;
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(pauses.Next(i, 0.1 * i));
+  EXPECT_FALSE(pauses.Next(100, 19));  // 9 s: frames that can't be read
+  const auto said = pauses.Next(101, 19 + 86400);
+  ASSERT_TRUE(said.has_value());
+  EXPECT_THAT(*said, ::testing::HasSubstr("frame 101 comes 86400 s after the one before it"));
+  EXPECT_FALSE(pauses.Next(102, 19.1 + 86400));
+}
+
+TEST(StampPauses, AFrameAMinuteIsNoPause) {
+  StampPauses pauses;
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(pauses.Next(i, 60.0 * i));
+  EXPECT_TRUE(pauses.Next(100, 60.0 * 100 + 3600));
 }
 
 }  // namespace

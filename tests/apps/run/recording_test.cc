@@ -10,8 +10,8 @@
 #include <opencv2/videoio.hpp>
 
 #include "tests/apps/tiny_town.h"
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -47,12 +47,24 @@ fs::path KittiTown() {
 }
 
 std::string Refusal(const fs::path& dataset, const CameraRequest& camera) {
-  try {
-    Recognise(dataset, camera);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::ErrorOf([&] { Recognise(dataset, camera); });
+}
+
+// What the command line may say.
+CameraRequest OfSensor(Sensor sensor) {
+  CameraRequest request;
+  request.sensor = sensor;
+  return request;
+}
+CameraRequest WithCamera(const std::string& camera) {
+  CameraRequest request;
+  request.camera = camera;
+  return request;
+}
+CameraRequest WithView(double view_deg) {
+  CameraRequest request;
+  request.view_deg = view_deg;
+  return request;
 }
 
 TEST(Recording, OfKittiWithTwoCamerasIsStereoWithItsOwnCalibration) {
@@ -68,31 +80,24 @@ TEST(Recording, OfKittiWithTwoCamerasIsStereoWithItsOwnCalibration) {
   EXPECT_THAT(town.findings[2], HasSubstr("calib.txt"));
   const auto dataset = OpenDataset(folder, town.config.dataset);
   EXPECT_GT(dataset->Rig().baseline_m, 0.1);
+  EXPECT_EQ(Recognise(folder, OfSensor(Sensor::kMono)).config.dataset.sensor, Sensor::kMono);
 }
 
-TEST(Recording, IsOfOneCameraWhereThatIsAskedFor) {
-  CameraRequest camera;
-  camera.sensor = Sensor::kMono;
-  EXPECT_EQ(Recognise(KittiTown(), camera).config.dataset.sensor, Sensor::kMono);
-}
-
-TEST(Recording, OfKittiWithoutCalibrationIsOneCameraWithAGuess) {
-  const fs::path folder = KittiTown();
-  fs::remove(folder / "calib.txt");
-  const Recording town = Recognise(folder, {});
-  EXPECT_TRUE(town.guessed_lens);
-  EXPECT_EQ(town.config.dataset.sensor, Sensor::kMono);
-  EXPECT_THAT(town.findings[1], HasSubstr("the right camera is not used"));
-  EXPECT_THAT(town.findings[2], HasSubstr("guessed"));
-  EXPECT_NO_THROW(OpenDataset(folder, town.config.dataset));
-  CameraRequest camera;
-  camera.sensor = Sensor::kStereo;
-  EXPECT_THAT(Refusal(folder, camera), HasSubstr("the distance of the two cameras is not known"));
-}
-
-TEST(Recording, OfTumWithDepthIsRgbd) {
-  EXPECT_EQ(Recognise(TumFolder("a", true), {}).config.dataset.sensor, Sensor::kRgbd);
-  EXPECT_EQ(Recognise(TumFolder("a", false), {}).config.dataset.sensor, Sensor::kMono);
+TEST(Recording, OfPairsWithoutACalibrationIsOneCameraWithAGuess) {
+  const fs::path kitti = KittiTown(), pairs = testing::FreshFolder() / "pairs";
+  fs::remove(kitti / "calib.txt");
+  for (const char* camera : {"cam0", "cam1"}) WriteImages(pairs / camera);
+  for (const fs::path& folder : {kitti, pairs}) {
+    const Recording found = Recognise(folder, {});
+    EXPECT_TRUE(found.guessed_lens);
+    EXPECT_EQ(found.config.dataset.sensor, Sensor::kMono);
+    EXPECT_THAT(found.findings[1], HasSubstr("the right camera is not used"));
+    EXPECT_THAT(found.findings[2], HasSubstr("guessed"));
+    EXPECT_EQ(OpenDataset(folder, found.config.dataset)->Size(),
+              folder == pairs ? 3u : std::size_t{testing::kTinyFrames});
+    EXPECT_THAT(Refusal(folder, OfSensor(Sensor::kStereo)),
+                HasSubstr("the distance of the two cameras is not known"));
+  }
 }
 
 TEST(Recording, OfTumsFolderNamesHasThePublishedCamera) {
@@ -113,9 +118,7 @@ TEST(Recording, OfColourAndDepthInOneFolderIsRgbdInTheLayoutsUnit) {
     cv::imwrite(name + ".color.png", cv::Mat(48, 64, CV_8UC3, cv::Scalar(80, 90, 100)));
     cv::imwrite(name + ".depth.png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(1500)));
   }
-  CameraRequest camera;
-  camera.camera = "60,60,32,24";
-  const Recording scene = Recognise(folder, camera);
+  const Recording scene = Recognise(folder, WithCamera("60,60,32,24"));
   EXPECT_EQ(scene.config.dataset.sensor, Sensor::kRgbd);
   EXPECT_THAT(scene.findings[0], HasSubstr("7-Scenes (frame-*.color, frame-*.depth)"));
   EXPECT_THAT(scene.findings[1], HasSubstr("RGB-D, 1000 units of depth a metre"));
@@ -124,7 +127,9 @@ TEST(Recording, OfColourAndDepthInOneFolderIsRgbdInTheLayoutsUnit) {
   EXPECT_FLOAT_EQ(dataset->Read(0).frame->depth_m.at<float>(0, 0), 1.5F);
 }
 
-TEST(Recording, OfTumWithoutAKnownUnitOfDepthSaysWhatIsAssumed) {
+TEST(Recording, OfTumWithDepthIsRgbdAndSaysWhichUnitIsAssumed) {
+  EXPECT_EQ(Recognise(TumFolder("a", true), {}).config.dataset.sensor, Sensor::kRgbd);
+  EXPECT_EQ(Recognise(TumFolder("a", false), {}).config.dataset.sensor, Sensor::kMono);
   EXPECT_THAT(Recognise(TumFolder("a", true), {}).findings[1],
               AllOf(HasSubstr("5000 units of depth a metre assumed"), HasSubstr("depth_units_per_m=1000")));
   EXPECT_THAT(Recognise(TumFolder("rgbd_dataset_freiburg1_desk", true), {}).findings[1],
@@ -133,20 +138,6 @@ TEST(Recording, OfTumWithoutAKnownUnitOfDepthSaysWhatIsAssumed) {
   camera.depth_units_per_m = 1000;
   EXPECT_THAT(Recognise(TumFolder("a", true), camera).findings[1],
               HasSubstr("1000 units of depth a metre ("));
-}
-
-TEST(Recording, OfPairsWithoutACalibrationIsOneCameraWithAGuess) {
-  const fs::path folder = testing::FreshFolder();
-  WriteImages(folder / "cam0");
-  WriteImages(folder / "cam1");
-  const Recording pair = Recognise(folder, {});
-  EXPECT_EQ(pair.config.dataset.sensor, Sensor::kMono);
-  EXPECT_TRUE(pair.guessed_lens);
-  EXPECT_THAT(pair.findings[1], HasSubstr("the right camera is not used"));
-  EXPECT_EQ(OpenDataset(folder, pair.config.dataset)->Size(), 3u);
-  CameraRequest camera;
-  camera.sensor = Sensor::kStereo;
-  EXPECT_THAT(Refusal(folder, camera), HasSubstr("the distance of the two cameras is not known"));
 }
 
 TEST(Recording, OfTartanAirIsStereoWithThePublishedCamera) {
@@ -161,10 +152,13 @@ TEST(Recording, OfTartanAirIsStereoWithThePublishedCamera) {
   EXPECT_EQ(OpenDataset(folder, air.config.dataset)->Rig().baseline_m, 0.25);
 }
 
-TEST(Recording, OfImagesTakesTheCalibrationBesideThem) {
+TEST(Recording, OfImagesTakesAFieldOfViewOrTheCalibrationBesideThem) {
   const fs::path folder = testing::FreshFolder();
   WriteImages(folder);
   EXPECT_TRUE(Recognise(folder, {}).guessed_lens);
+  const auto given = Recognise(folder, WithView(90)).config.dataset.camera;
+  EXPECT_NEAR(given->fx, 32, 1e-9);
+  EXPECT_NEAR(given->cx, 31.5, 1e-9);
   std::ofstream(folder / "calibration.yaml")
       << "Camera.fx: 60\nCamera.fy: 60\nCamera.cx: 32\nCamera.cy: 24\n";
   const Recording known = Recognise(folder, {});
@@ -188,31 +182,18 @@ TEST(Recording, WithAConfigurationInItsFolderIsReadAsThatSays) {
 }
 
 TEST(Recording, TakesTheCameraOfTheCommandLineFirst) {
-  CameraRequest camera;
-  camera.camera = "70,71,30,20";
   const fs::path town = KittiTown();
-  const auto given = Recognise(town, camera).config.dataset.camera;
+  const auto given = Recognise(town, WithCamera("70,71,30,20")).config.dataset.camera;
   ASSERT_TRUE(given);
   EXPECT_EQ(given->fy, 71);
   EXPECT_EQ(given->distortion, Distortion::kNone);
-  camera.camera = "70,71,30,20,0.1,0.2,0,0";
-  EXPECT_EQ(Recognise(town, camera).config.dataset.camera->distortion, Distortion::kRadTan);
-}
-
-TEST(Recording, KnowsTheFocalLengthOfAFieldOfView) {
-  CameraRequest camera;
-  camera.view_deg = 90;
-  const fs::path folder = testing::FreshFolder();
-  WriteImages(folder);
-  const auto given = Recognise(folder, camera).config.dataset.camera;
-  EXPECT_NEAR(given->fx, 32, 1e-9);
-  EXPECT_NEAR(given->cx, 31.5, 1e-9);
+  EXPECT_EQ(Recognise(town, WithCamera("70,71,30,20,0.1,0.2,0,0")).config.dataset.camera->distortion,
+            Distortion::kRadTan);
 }
 
 TEST(Recording, OfAStreamIsNotLookedForAmongFiles) {
-  CameraRequest camera;
-  camera.camera = "70,71,30,20";
-  EXPECT_THAT(Refusal("rtsp://127.0.0.1:1/front", camera), HasSubstr("no stream of video can be opened"));
+  EXPECT_THAT(Refusal("rtsp://127.0.0.1:1/front", WithCamera("70,71,30,20")),
+              HasSubstr("no stream of video can be opened"));
 }
 
 TEST(Recording, OfOneCameraWithSensorStereoHasBothImagesSideBySide) {
@@ -221,8 +202,7 @@ TEST(Recording, OfOneCameraWithSensorStereoHasBothImagesSideBySide) {
   if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
   writer.write(cv::Mat(48, 128, CV_8UC3, cv::Scalar::all(80)));
   writer.release();
-  CameraRequest camera;
-  camera.view_deg = 90;
+  CameraRequest camera = WithView(90);
   camera.sensor = Sensor::kStereo;
   const Recording found = Recognise("camera:" + file.string(), camera);
   EXPECT_EQ(found.config.dataset.camera->width, 64) << "of one of the two images";
@@ -240,27 +220,20 @@ TEST(Recording, OfAPipeIsNotOpenedBeforeTheRun) {
   EXPECT_TRUE(found.guessed_lens);
   EXPECT_FALSE(found.config.dataset.camera);
   EXPECT_EQ(found.config.dataset.fov_deg, 67);
-  CameraRequest camera;
-  camera.camera = "70,71,30,20";
-  EXPECT_EQ(Recognise("camera:" + pipe.string(), camera).config.dataset.camera->fy, 71);
-}
-
-TEST(Recording, OfTwoCamerasNeedsToBeToldWhatTheyAre) {
-  EXPECT_THAT(Refusal("camera:0,1", {}), HasSubstr("what are the two cameras?"));
+  EXPECT_EQ(Recognise("camera:" + pipe.string(), WithCamera("70,71,30,20")).config.dataset.camera->fy, 71);
 }
 
 TEST(Recording, RefusesACameraThatCantBe) {
   const fs::path town = KittiTown();
-  CameraRequest camera;
-  camera.camera = "70,71,30";
-  EXPECT_THAT(Refusal(town, camera), HasSubstr("--camera: has 3 numbers"));
-  camera.camera = "70,x,30,20";
-  EXPECT_THAT(Refusal(town, camera), HasSubstr("'x' is no number"));
-  camera.camera = "70,71,-30,20";
-  EXPECT_THAT(Refusal(town, camera), HasSubstr("principal point"));
+  for (const auto& [text, why] : {std::pair("70,71,30", "--camera: has 3 numbers"),
+                                  {"70,x,30,20", "'x' is no number"},
+                                  {"70,71,-30,20", "principal point"}})
+    EXPECT_THAT(Refusal(town, WithCamera(text)), HasSubstr(why));
+  CameraRequest camera = WithCamera("70,71,30,20");
   camera.view_deg = 60;
   EXPECT_THAT(Refusal(town, camera), HasSubstr("give one of them"));
   EXPECT_THAT(Refusal("/nowhere", {}), HasSubstr("does not exist"));
+  EXPECT_THAT(Refusal("camera:0,1", {}), HasSubstr("what are the two cameras?"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "apps/run/run_note.h"
+#include "apps/run/runner.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

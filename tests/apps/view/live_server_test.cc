@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "apps/view/live_connections.h"
 #include "core/stopwatch.h"
 #include "tests/apps/view/live_client.h"
 #include "tutti/core/error.h"
@@ -25,6 +26,25 @@ LiveViewOptions AnyPort() {
   options.port = 0;
   return options;
 }
+
+std::string Get(const std::string& path, const std::string& headers = "") {
+  return "GET " + path + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";
+}
+
+const std::string kPause = "POST /control?do=pause HTTP/1.1\r\nHost: localhost\r\nX-Tutti: 1\r\n\r\n";
+
+class LiveServerTest : public ::testing::Test {
+ protected:
+  // What comes for a request.
+  std::string Answer(const std::string& request, double seconds = 2) const {
+    LiveClient client(server.Url());
+    client.Send(request);
+    return client.Answer(seconds);
+  }
+
+  LiveState state;
+  const LiveServer server{AnyPort(), state};
+};
 
 // A run whose data set is missing ends before anybody has looked at it.
 TEST(LiveServer, StopsAtOnceHoweverEarly) {
@@ -52,13 +72,7 @@ int OpenDescriptors() {
 
 void Wait(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-std::string Get(const std::string& path, const std::string& headers = "") {
-  return "GET " + path + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";
-}
-
-TEST(LiveServer, AThousandConnectionsUseUpNoDescriptors) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
+TEST_F(LiveServerTest, AThousandConnectionsUseUpNoDescriptors) {
   const int before = OpenDescriptors();
   std::vector<std::unique_ptr<LiveClient>> clients;
   int most = 0;
@@ -72,34 +86,24 @@ TEST(LiveServer, AThousandConnectionsUseUpNoDescriptors) {
   EXPECT_LE(most, 32);
 }
 
-TEST(LiveServer, LastDescriptorsAreTheRuns) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
-  LiveClient client(server.Url());
-  client.Send(Get("/"));
-  EXPECT_THAT(client.Answer(2), ::testing::StartsWith("HTTP/1.1 200"));
+TEST_F(LiveServerTest, LastDescriptorsAreTheRuns) {
+  EXPECT_THAT(Answer(Get("/")), ::testing::StartsWith("HTTP/1.1 200"));
   rlimit all{};
   getrlimit(RLIMIT_NOFILE, &all);
   const rlimit few{60, all.rlim_max};
   setrlimit(RLIMIT_NOFILE, &few);
-  LiveClient late(server.Url());
-  late.Send(Get("/"));
-  EXPECT_EQ(late.Answer(2), "");
+  EXPECT_EQ(Answer(Get("/")), "");
   setrlimit(RLIMIT_NOFILE, &all);
 }
 
-TEST(LiveServer, SlowClientsDoNotHoldUpThePage) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
+TEST_F(LiveServerTest, SlowClientsDoNotHoldUpThePage) {
   std::vector<std::unique_ptr<LiveClient>> slow;
   for (int k = 0; k < 50; ++k) {
     slow.push_back(std::make_unique<LiveClient>(server.Url()));
     slow.back()->Send("GET / HT");
     Wait(0.005);
   }
-  LiveClient client(server.Url());
-  client.Send(Get("/"));
-  EXPECT_THAT(client.Answer(3), ::testing::StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(Answer(Get("/"), 3), ::testing::StartsWith("HTTP/1.1 200"));
 }
 
 // Until the server has written all that it can: messages of megabytes take a sanitizer's build seconds to
@@ -142,9 +146,7 @@ TEST(LiveServer, EndsWithinTwoSecondsWhateverClientsDo) {
 }
 
 // The system's buffers take what is sent to them for a long time, and pauses say little.
-TEST(LiveServer, ViewersThatReadNothingDoNotHoldUpAPause) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
+TEST_F(LiveServerTest, ViewersThatReadNothingDoNotHoldUpAPause) {
   std::vector<std::unique_ptr<LiveClient>> silent;
   for (int k = 0; k < 6; ++k) {
     silent.push_back(std::make_unique<LiveClient>(server.Url()));
@@ -153,9 +155,7 @@ TEST(LiveServer, ViewersThatReadNothingDoNotHoldUpAPause) {
   for (int k = 0; k < 500 && state.Viewers() < 4; ++k) Wait(0.01);
   ASSERT_EQ(state.Viewers(), 4);
   state.Log("a frame");
-  LiveClient pauses(server.Url());
-  pauses.Send("POST /control?do=pause HTTP/1.1\r\nHost: localhost\r\nX-Tutti: 1\r\n\r\n");
-  EXPECT_THAT(pauses.Answer(2), ::testing::StartsWith("HTTP/1.1 204"));
+  EXPECT_THAT(Answer(kPause), ::testing::StartsWith("HTTP/1.1 204"));
   std::atomic<bool> goes_on{false};
   std::thread run([&] {
     state.WaitWhilePaused(0.5);
@@ -168,9 +168,7 @@ TEST(LiveServer, ViewersThatReadNothingDoNotHoldUpAPause) {
 }
 
 // Whoever reads holds it up as long as it likes.
-TEST(LiveServer, AViewerThatReadsHoldsUpAPause) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
+TEST_F(LiveServerTest, AViewerThatReadsHoldsUpAPause) {
   LiveClient reads(server.Url());
   reads.Send(Get("/events"));
   for (int k = 0; k < 500 && state.Viewers() < 1; ++k) Wait(0.01);
@@ -186,9 +184,7 @@ TEST(LiveServer, AViewerThatReadsHoldsUpAPause) {
   run.join();
 }
 
-TEST(LiveServer, HeadersHaveABound) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
+TEST_F(LiveServerTest, HeadersHaveABound) {
   LiveClient client(server.Url());
   std::size_t sent = client.Send("GET / HTTP/1.1\r\n");
   const std::string header = "X: " + std::string(1000, 'a') + "\r\n";
@@ -196,26 +192,40 @@ TEST(LiveServer, HeadersHaveABound) {
   EXPECT_LT(sent, 20000000U);  // what the sockets' buffers take
 }
 
-TEST(LiveServer, RangesAreNotCopies) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
+TEST_F(LiveServerTest, RangesAreNotCopies) {
   std::string ranges = "Range: bytes=0-";
   for (int k = 0; k < 1500; ++k) ranges += ",0-";
-  LiveClient whole(server.Url());
-  whole.Send(Get("/"));
-  const std::string page = whole.Answer(2);
-  LiveClient parts(server.Url());
-  parts.Send(Get("/", ranges + "\r\n"));
-  EXPECT_EQ(parts.Answer(2), page);
+  EXPECT_EQ(Answer(Get("/", ranges + "\r\n")), Answer(Get("/")));
 }
 
-TEST(LiveServer, BodiesAreNotWaitedFor) {
-  LiveState state;
-  const LiveServer server(AnyPort(), state);
-  LiveClient client(server.Url());
-  client.Send(
-      "POST /control?do=pause HTTP/1.1\r\nHost: localhost\r\nX-Tutti: 1\r\nContent-Length: 1000\r\n\r\n");
-  EXPECT_THAT(client.Answer(2), ::testing::StartsWith("HTTP/1.1 204"));
+TEST_F(LiveServerTest, BodiesAreNotWaitedFor) {
+  EXPECT_THAT(Answer(kPause.substr(0, kPause.size() - 2) + "Content-Length: 1000\r\n\r\n"),
+              ::testing::StartsWith("HTTP/1.1 204"));
+}
+
+TEST(LiveAccess, LoopbackIsWhatThisMachineAloneReaches) {
+  for (const char* address : {"127.0.0.1", "127.8.9.10", "::1", "localhost"})
+    EXPECT_TRUE(IsLoopback(address)) << address;
+  for (const char* address :
+       {"0.0.0.0", "::", "192.168.1.7", "127.evil.example", "127.0.0.1.evil.example", ""})
+    EXPECT_FALSE(IsLoopback(address)) << address;
+}
+
+TEST(LiveAccess, AHostHeaderMustNameThisMachine) {
+  for (const char* host : {"127.0.0.1:8077", "localhost:8077", "localhost", "[::1]:8077"})
+    EXPECT_TRUE(NamesLoopback(host)) << host;
+  for (const char* host : {"evil.example", "127.evil.example:8077", "localhost.evil.example",
+                           "[::1].evil.example", "[::1]evil", "127.0.0.1.evil.example", ""})
+    EXPECT_FALSE(NamesLoopback(host)) << host;
+}
+
+TEST(LiveAccess, TokensHave128BitsAndDiffer) {
+  const std::string token = RandomToken();
+  EXPECT_EQ(token.size(), 32U);
+  EXPECT_NE(token, RandomToken());
+  EXPECT_TRUE(SameToken(token, token));
+  EXPECT_FALSE(SameToken(token, token + "0"));
+  EXPECT_FALSE(SameToken(token, ""));
 }
 
 }  // namespace

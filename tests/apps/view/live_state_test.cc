@@ -26,7 +26,7 @@ TEST(LiveState, WithoutPosesThereAreFramesButNoPlaces) {
   const std::vector<Loop> loops;
   InputFrame frame;
   frame.index = 12;
-  state.SetFrame(frame, {}, {nullptr, loops});
+  state.OnFrame(frame, {}, {nullptr, loops});
   LiveCursor cursor;
   LiveNews news;
   ASSERT_TRUE(state.WaitForNews(&cursor, 0, &news));

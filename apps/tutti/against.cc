@@ -1,10 +1,9 @@
-#include "apps/tutti/against.h"
-
+// Published figures beside one's own: `tutti evaluate --against`.
 #include <algorithm>
 #include <limits>
 #include <map>
 
-#include "apps/tutti/published.h"
+#include "apps/tutti/evaluation_output.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -15,10 +14,7 @@ using Json = nlohmann::ordered_json;
 
 std::string Figure(const std::optional<double>* ate_m) {
   if (ate_m == nullptr) return "-";
-  if (!*ate_m) return "x";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", **ate_m);
-  return text;
+  return *ate_m ? Formatted("%.6g", **ate_m) : "x";
 }
 
 std::vector<std::string> Sensors(const std::string& benchmark) {
@@ -53,7 +49,7 @@ std::string FindSequence(const Against& against, const EvaluationInput& input) {
     if (!sequence.empty()) return sequence;
   }
   throw InputError("--against " + against.benchmark +
-                   ": the names of the files don't say which sequence it is; " + "pass --sequence, one of " +
+                   ": the names of the files don't say which sequence it is; pass --sequence, one of " +
                    JoinText(known));
 }
 
@@ -104,19 +100,19 @@ PublishedComparison::PublishedComparison(const Against& against, const Evaluatio
   if (!unusual.empty())
     throw InputError(begin + "the published figures were made without " + unusual + "; leave it out");
   sequence_ = FindSequence(against, input);
-  std::string others;
-  bool sequence_there = false;
+  std::string other;
   for (const PublishedRow& row : PublishedRows()) {
     if (row.benchmark != benchmark_ || row.sensor != sensor_ || row.Of(sequence_) == nullptr) continue;
-    if (row.alignment == alignment_) return;
-    sequence_there = true;
-    others = row.alignment;
+    if (row.alignment == alignment_)
+      rows_.push_back(&row);
+    else
+      other = row.alignment;
   }
-  if (!sequence_there) {
+  if (!rows_.empty()) return;
+  if (other.empty())
     throw InputError(begin + "there are no figures of " + sequence_ + " with the sensor " + sensor_);
-  }
   throw InputError(begin + "the published figures of the sensor " + sensor_ + " are after the alignment " +
-                   others + ", and this evaluation's is " + alignment_ + "; pass --align " + others);
+                   other + ", and this evaluation's is " + alignment_ + "; pass --align " + other);
 }
 
 std::string PublishedComparison::Describe(const std::vector<EvaluatedEstimate>& estimates,
@@ -124,18 +120,13 @@ std::string PublishedComparison::Describe(const std::vector<EvaluatedEstimate>& 
   std::vector<std::pair<double, std::vector<std::string>>> rows;
   for (const EvaluatedEstimate& estimate : estimates) {
     const double ate = estimate.report.ate.rmse, share = estimate.report.coverage.share();
-    rows.emplace_back(ate,
-                      std::vector<std::string>{estimate.name, Fixed(ate, 4),
-                                               Fixed(100 * share, 2) + (share < kFullCoverage ? " !" : ""),
-                                               "this evaluation"});
+    const std::string covered = Fixed(100 * share, 2) + (share < kFullCoverage ? " !" : "");
+    rows.push_back({ate, {estimate.name, Fixed(ate, 4), covered, "this evaluation"}});
   }
-  for (const PublishedRow& row : PublishedRows()) {
-    const std::optional<double>* ate = row.Of(sequence_);
-    if (row.benchmark != benchmark_ || row.sensor != sensor_ || row.alignment != alignment_ || ate == nullptr)
-      continue;
-    rows.emplace_back(
-        ate->value_or(std::numeric_limits<double>::infinity()),
-        std::vector<std::string>{row.system, Figure(ate), "-", row.source + " (" + row.protocol + ")"});
+  for (const PublishedRow* row : rows_) {
+    const std::optional<double>* ate = row->Of(sequence_);
+    rows.push_back({ate->value_or(std::numeric_limits<double>::infinity()),
+                    {row->system, Figure(ate), "-", row->source + " (" + row->protocol + ")"}});
   }
   std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   TextTable table;
@@ -151,14 +142,12 @@ Json PublishedComparison::ToJson() const {
                {"sensor", sensor_},
                {"alignment", alignment_},
                {"rows", Json::array()}};
-  for (const PublishedRow& row : PublishedRows()) {
-    const std::optional<double>* ate = row.Of(sequence_);
-    if (row.benchmark != benchmark_ || row.sensor != sensor_ || row.alignment != alignment_ || ate == nullptr)
-      continue;
-    json["rows"].push_back({{"system", row.system},
-                            {"ate_rmse_m", *ate ? Json(**ate) : Json()},
-                            {"source", row.source},
-                            {"protocol", row.protocol}});
+  for (const PublishedRow* row : rows_) {
+    const std::optional<double>& ate = *row->Of(sequence_);
+    json["rows"].push_back({{"system", row->system},
+                            {"ate_rmse_m", ate ? Json(*ate) : Json()},
+                            {"source", row->source},
+                            {"protocol", row->protocol}});
   }
   return json;
 }

@@ -63,11 +63,6 @@ MeanInterval MeanWithInterval(const std::vector<double>& values);
 /// "mean +- half-width", the mean alone where there is no interval, "-" where there is no value.
 std::string IntervalCell(const MeanInterval& value, int decimals);
 
-/// Runs in groups: by data set, then by variant, both in the order of their first appearance.
-struct Comparison {
-  std::vector<RunFigures> runs;
-};
-
 /// The table of one data set, and what it says below.
 struct ComparisonTable {
   std::string dataset;
@@ -82,13 +77,19 @@ struct TableChoice {
   std::optional<int> decimals;       ///< of errors; nothing: those that fit each column
   bool bold_best = false;            ///< the best mean of each column of errors, times and memory
 };
-std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison, const TableChoice& choice = {});
+/// Of the runs in groups: by data set, then by variant, both in the order of their first appearance.
+std::vector<ComparisonTable> ComparisonTables(const std::vector<RunFigures>& runs,
+                                              const TableChoice& choice = {});
 
 /// One table per data set and one of the time per stage, with the paired t-test of each variant's ATE against
 /// the ensemble's over common samples (from kLeastPairs on), and below it what varies between the runs, which
 /// variants the ensemble beats, and which it does not. CSV: the first table alone, for all data sets.
-std::string DescribeComparison(const Comparison& comparison, TableFormat format,
+std::string DescribeComparison(const std::vector<RunFigures>& runs, TableFormat format,
                                const TableChoice& choice = {});
-nlohmann::ordered_json ComparisonJson(const Comparison& comparison);
+nlohmann::ordered_json ComparisonJson(const std::vector<RunFigures>& runs);
+/// The page of a comparison (report.html), or removes an older one if pages are left out. Runs without a
+/// report.json are in the table alone.
+void WriteComparisonReport(const std::filesystem::path& file, const std::string& title,
+                           const std::vector<RunFigures>& runs);
 
 }  // namespace tutti::cli

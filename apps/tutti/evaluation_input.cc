@@ -1,13 +1,12 @@
 #include "apps/tutti/evaluation_input.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
 
 #include "apps/tutti/evaluation_report.h"
-#include "core/terminal.h"
+#include "apps/tutti/files.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -18,10 +17,6 @@ PoseFile Read(const std::string& file, const std::string& format, const std::vec
   std::optional<PoseFileFormat> asked;
   if (format != "auto") asked = ParsePoseFileFormat(format);
   return ReadPoseFile(file, asked, times);
-}
-
-void SayWarnings(const PoseFile& poses) {
-  for (const std::string& warning : poses.warnings) internal::Say("warning: %s", warning.c_str());
 }
 
 Eigen::Vector3d Axis(const std::string& name) {
@@ -57,16 +52,15 @@ EvaluatedEstimate Evaluate(const NamedPoses& reference, const EvaluationInput& i
   return out;
 }
 
-std::vector<double> Times(const EvaluationInput& input) {
-  if (input.times.empty()) return {};
-  std::vector<double> times = ReadTimes(input.times);
-  if (times.empty()) throw InputError(input.times + ": holds no time stamp");
+std::vector<double> Times(const std::string& file) {
+  if (file.empty()) return {};
+  std::vector<double> times = ReadTimes(file);
+  if (times.empty()) throw InputError(file + ": holds no time stamp");
   return times;
 }
 
 std::vector<double> StampsOfFrames(const std::string& file) {
-  std::vector<double> stamps = ReadTimes(file);
-  if (stamps.empty()) throw InputError(file + ": holds no time stamp");
+  std::vector<double> stamps = Times(file);
   const auto back = std::is_sorted_until(stamps.begin(), stamps.end());
   if (back != stamps.end())
     throw InputError(file + ": the stamps go back in time at number " +
@@ -94,7 +88,7 @@ std::vector<NamedPoseFile> ReadQuietly(const EvaluationInput& input) {
     throw InputError("--name: " + std::to_string(input.names.size()) + " names for " +
                      std::to_string(input.estimates.size()) + " estimates; give one for each");
   }
-  const std::vector<double> times = Times(input);
+  const std::vector<double> times = Times(input.times);
   const std::vector<std::string> names = input.names.empty() ? ShortNames(input.estimates) : input.names;
   std::vector<NamedPoseFile> out;
   for (std::size_t k = 0; k < input.estimates.size(); ++k) {
@@ -119,21 +113,21 @@ void RequireFiles(const EvaluationInput& input) {
 
 std::vector<NamedPoseFile> ReadEstimates(const EvaluationInput& input) {
   std::vector<NamedPoseFile> out = ReadQuietly(input);
-  for (const NamedPoseFile& estimate : out) SayWarnings(estimate.poses);
+  for (const NamedPoseFile& estimate : out) SayWarnings(estimate.poses.warnings);
   return out;
 }
 
 std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
   RequireFiles(input);
-  if (!input.frames.empty()) input.options.frame_stamps_s = StampsOfFrames(input.frames);
+  input.options.frame_stamps_s = StampsOfFrames(input.frames);
   const std::string& format = input.reference_format.empty() ? input.format : input.reference_format;
-  NamedPoses reference = {input.reference, Read(input.reference, format, Times(input))};
+  NamedPoses reference = {input.reference, Read(input.reference, format, Times(input.times))};
   std::vector<NamedPoseFile> estimates = ReadQuietly(input);
   for (NamedPoseFile& estimate : estimates) AgreeOnUnit(reference.poses, estimate.poses);
-  SayWarnings(reference.poses);
+  SayWarnings(reference.poses.warnings);
   std::vector<EvaluatedEstimate> out;
   for (const NamedPoseFile& estimate : estimates) {
-    SayWarnings(estimate.poses);
+    SayWarnings(estimate.poses.warnings);
     out.push_back(Evaluate(reference, input, estimate));
   }
   return out;

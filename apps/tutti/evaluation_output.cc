@@ -1,7 +1,5 @@
 #include "apps/tutti/evaluation_output.h"
 
-#include <cstdio>
-
 #include "apps/tutti/evaluation_report.h"
 
 namespace tutti::cli {
@@ -20,11 +18,9 @@ Json EstimateJson(const std::string& reference, const EvaluatedEstimate& estimat
 
 std::string DeltaName(const EvaluationOptions& options) {
   static constexpr const char* kShort[] = {"frames", "m", "deg", "s", "rad"};
-  char text[64];
   const bool one_frame = options.rpe_unit == DeltaUnit::kFrames && options.rpe_delta == 1;
-  std::snprintf(text, sizeof text, "%g %s", options.rpe_delta,
-                one_frame ? "frame" : kShort[static_cast<int>(options.rpe_unit)]);
-  return text;
+  return Formatted("%g %s", options.rpe_delta,
+                   one_frame ? "frame" : kShort[static_cast<int>(options.rpe_unit)]);
 }
 
 std::string SegmentsLine(const char* name, const SegmentErrors& errors) {
@@ -158,13 +154,10 @@ std::string ErrorsCsv(const std::vector<EvaluatedEstimate>& estimates) {
   for (const EvaluatedEstimate& estimate : estimates) {
     const EvaluationReport& r = estimate.report;
     for (std::size_t k = 0; k < r.pairs; ++k) {
-      char line[160];
-      std::snprintf(line, sizeof line, ",%.9f,%.9g", r.poses.stamps_s[k], r.absolute.translation[k]);
-      text += '"' + estimate.name + '"' + line;
-      std::snprintf(line, sizeof line, ",%.9g,%.9g", r.rotations ? r.absolute.rotation_deg[k] : 0,
-                    r.rotations ? r.absolute.full[k] : 0);
-      text += r.rotations ? line : ",,";
-      text += '\n';
+      text += '"' + estimate.name + '"' +
+              Formatted(",%.9f,%.9g", r.poses.stamps_s[k], r.absolute.translation[k]) +
+              (r.rotations ? Formatted(",%.9g,%.9g", r.absolute.rotation_deg[k], r.absolute.full[k]) : ",,") +
+              "\n";
     }
   }
   return text;

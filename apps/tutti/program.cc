@@ -1,24 +1,24 @@
-#include "apps/tutti/program.h"
-
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <exception>
 #include <iostream>
 #include <memory>
+#include <new>
 #include <sstream>
+#include <system_error>
 #include <vector>
 
-#include "apps/tutti/describe.h"
-#include "apps/tutti/exhausted.h"
+#include "apps/tutti/commands.h"
 #include "apps/tutti/foreign_lines.h"
 #include "apps/tutti/help.h"
-#include "apps/tutti/number_checks.h"
+#include "apps/tutti/options.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/slam/version.h"
 
-// Of OpenMP, which comes with CHOLMOD; null without it.
+// OpenMP's, which comes with CHOLMOD; null without it.
 extern "C" __attribute__((weak)) void omp_set_max_active_levels(int levels);
 
 namespace tutti::cli {
@@ -97,6 +97,36 @@ std::string UnknownOption(const CLI::App& command, const std::vector<std::string
   return {};
 }
 
+// What ran out, where the system had no more, and what to lower; empty if `error` is of another kind.
+std::string WhatRanOut(const std::exception& error) {
+  int code = 0;
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  if (system != nullptr && (system->code().category() == std::system_category() ||
+                            system->code().category() == std::generic_category()))
+    code = system->code().value();
+  const std::string text = error.what();  // of OpenCV's exception, which this program does not link
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+      text.find("Insufficient memory") != std::string::npos ||
+      text.find("Failed to allocate") != std::string::npos)
+    code = ENOMEM;
+  switch (code) {
+    case ENOMEM:
+      return "there is not enough memory; give fewer --threads, smaller images or fewer frames, or raise the "
+             "limit (ulimit -v)";
+    case EAGAIN:
+      return "the system starts no more threads; give fewer --threads, or raise the limits (ulimit -u, "
+             "ulimit -v)";
+    case EMFILE:
+    case ENFILE:
+      return "no more files can be open at a time; give fewer --threads, or raise the limit (ulimit -n)";
+    case ENOSPC:
+    case EDQUOT:
+      return "the disk is full; free some space, or give a folder on another disk";
+    default:
+      return {};
+  }
+}
+
 // Prints what the library says: of --help, too.
 int Exit(const CLI::App& app, const CLI::ParseError& error) {
   std::ostringstream text;
@@ -105,9 +135,14 @@ int Exit(const CLI::App& app, const CLI::ParseError& error) {
   return status == 0 ? 0 : 1;
 }
 
+int Fail(const std::string& text) {
+  internal::Say("%s", text.c_str());
+  return 1;
+}
+
 }  // namespace
 
-int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, int (*other)(char** argv)) {
+int RunProgram(int argc, char** argv, const std::map<std::string, SetUp*>& own, int (*other)(char** argv)) {
   StartNoThreadsOfOpenMp();
   CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};
   app.formatter(std::make_shared<WrappedHelp>(internal::TerminalColumns(stdout)));
@@ -143,20 +178,14 @@ int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, i
   } catch (const CLI::ExtrasError& e) {
     const CLI::App& command = *app.get_subcommands().front();
     const std::string unknown = UnknownOption(command, command.remaining(true));
-    if (unknown.empty()) return Exit(app, e);
-    internal::Say("%s", unknown.c_str());
-    return 1;
+    return unknown.empty() ? Exit(app, e) : Fail(unknown);
   } catch (const CLI::ParseError& e) {
     return Exit(app, e);  // --help comes this way, too
   } catch (const InputError& e) {
-    internal::Say("%s", e.what());
-    return 1;
+    return Fail(e.what());
   } catch (const std::exception& e) {
     const std::string exhausted = WhatRanOut(e);
-    if (!exhausted.empty()) {
-      internal::Say("%s", exhausted.c_str());
-      return 1;
-    }
+    if (!exhausted.empty()) return Fail(exhausted);
     internal::Say("internal error: %s; please report it with the command line", e.what());
     return 2;
   }

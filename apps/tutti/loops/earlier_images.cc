@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/tutti/text_table.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"

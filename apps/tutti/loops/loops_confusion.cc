@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/plot/plot_picture.h"
-#include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/loops/loops_output.h"
 
 namespace tutti::cli {
 namespace {

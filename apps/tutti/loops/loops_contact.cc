@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/plot/plot_picture.h"
-#include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/loops/loops_output.h"
 #include "tutti/loopclosure/features.h"
 
 namespace tutti::cli {

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "apps/plot/plot.h"
-#include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/loops/loops_output.h"
 #include "core/replaced_file.h"
 
 namespace tutti::cli {

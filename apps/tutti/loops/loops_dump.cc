@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "apps/tutti/files.h"
+#include "apps/tutti/text_table.h"
 
 namespace tutti::cli {
 namespace {
@@ -46,6 +47,32 @@ std::string VerificationLine(const LoopRun& run, const LoopResult& result, const
                 tried.matches, tried.inliers, tried.mass, tried.coverage, tried.expected_inliers,
                 tried.log_nfa, tried.motion_spread, result.hypothesis);
   return cells + Quoted(tried.reason) + "\n";
+}
+
+// A line for every location that is a loop, or that somebody believes in a little.
+std::string PosteriorLines(const LoopRow& row, const LoopRun& run) {
+  constexpr double kWorthALine = 1e-4;
+  const LoopResult& r = row.result;
+  std::string text;
+  for (std::size_t i = 0; i < r.posterior_by_location.size(); ++i) {
+    const auto& [location, combined] = r.posterior_by_location[i];
+    double most = combined;
+    const LoopLabel label = run.truth.At(static_cast<int>(r.query), static_cast<int>(location));
+    char number[64];
+    std::snprintf(number, sizeof number, "%ld,%ld,%d,%.6g", run.Number(r.query), run.Number(location),
+                  static_cast<int>(label), combined);
+    std::string line = number;
+    for (const MemberOpinion& member : r.members) {
+      // A member that sat this image out has no posterior of it.
+      const auto& posterior = member.posterior_by_location;
+      const double value = i < posterior.size() ? posterior[i].second : 0.0;
+      most = std::max(most, value);
+      std::snprintf(number, sizeof number, ",%.6g", value);
+      line += number;
+    }
+    if (most >= kWorthALine || label == LoopLabel::kLoop) text += line + "\n";
+  }
+  return text;
 }
 
 void CheckWritten(const std::ofstream& out, const internal::ReplacedFile& file) {
@@ -95,6 +122,14 @@ void LoopsDump::Finish() {
   CheckWritten(verification_, verification_file_);
   candidates_file_.Commit();
   verification_file_.Commit();
+}
+
+void WritePosteriors(const LoopRun& run, const std::filesystem::path& file) {
+  std::string text = "image,location,truth,combined";
+  for (const std::string& name : run.options.members) text += "," + name;
+  text += "\n";
+  for (const LoopRow& row : run.rows) text += PosteriorLines(row, run);
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti::cli

@@ -1,4 +1,5 @@
-// What each candidate looked like to the detector, as files: for those who want to learn from it.
+// What each candidate looked like to the detector, and what each member believed of each location, as files:
+// for those who want to learn from it.
 #pragma once
 
 #include <filesystem>
@@ -29,5 +30,10 @@ class LoopsDump {
   internal::ReplacedFile candidates_file_, verification_file_;
   std::ofstream candidates_, verification_;
 };
+
+/// Writes `file`: "image,location,truth,combined,<member>..." for every pair that is a loop (truth 255; 128:
+/// ignored, 0: none) or where one of the posteriors is at least 1e-4. Needs a run with
+/// LoopDetectorOptions::keep_posterior. Throws InputError if it can't be written.
+void WritePosteriors(const LoopRun& run, const std::filesystem::path& file);
 
 }  // namespace tutti::cli

@@ -8,9 +8,10 @@
 #include <set>
 #include <utility>
 
+#include "apps/tutti/files.h"
 #include "apps/tutti/loops/earlier_images.h"
-#include "apps/tutti/loops/loops_pictures.h"
-#include "apps/tutti/posteriors_csv.h"
+#include "apps/tutti/loops/loops_dump.h"
+#include "apps/tutti/text_table.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
@@ -140,6 +141,23 @@ std::string Csv(const LoopRun& run) {
   return text;
 }
 
+// The loops that were accepted, one a line: both images with their files, probability, inliers.
+std::string FoundLoopsCsv(const LoopRun& run) {
+  std::string text = "image,loop_with,probability,inliers,matches,late,file,loop_with_file\n";
+  for (const LoopRow& row : run.rows) {
+    const LoopResult& r = row.result;
+    if (!r.accepted) continue;
+    char numbers[128];
+    std::snprintf(numbers, sizeof numbers, "%ld,%ld,%.9g,%d,%d,%d,", run.Number(r.query),
+                  run.Number(r.candidate), r.probability, r.verification.inliers, r.verification.matches,
+                  row.second_word == SecondWord::kAccepted ? 1 : 0);
+    const auto candidate = static_cast<std::size_t>(r.candidate);
+    const std::string other = candidate < run.rows.size() ? run.rows[candidate].file : "";
+    text += numbers + Quoted(row.file) + "," + Quoted(other) + "\n";
+  }
+  return text;
+}
+
 // Without a ground truth there is nothing to rank against.
 nlohmann::ordered_json FoundJson(const LoopRun& run, const LoopReport& report) {
   return {{"images", run.rows.size()},
@@ -189,28 +207,6 @@ const char* LabelName(LoopLabel label) {
 
 const char* SecondWordName(SecondWord word) {
   return word == SecondWord::kAccepted ? "accepted" : word == SecondWord::kWithdrawn ? "withdrawn" : "";
-}
-
-std::string Quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
-  return result + "\"";
-}
-
-std::string FoundLoopsCsv(const LoopRun& run) {
-  std::string text = "image,loop_with,probability,inliers,matches,late,file,loop_with_file\n";
-  for (const LoopRow& row : run.rows) {
-    const LoopResult& r = row.result;
-    if (!r.accepted) continue;
-    char numbers[128];
-    std::snprintf(numbers, sizeof numbers, "%ld,%ld,%.9g,%d,%d,%d,", run.Number(r.query),
-                  run.Number(r.candidate), r.probability, r.verification.inliers, r.verification.matches,
-                  row.second_word == SecondWord::kAccepted ? 1 : 0);
-    const auto candidate = static_cast<std::size_t>(r.candidate);
-    const std::string other = candidate < run.rows.size() ? run.rows[candidate].file : "";
-    text += numbers + Quoted(row.file) + "," + Quoted(other) + "\n";
-  }
-  return text;
 }
 
 LoopReport EvaluateRun(const LoopRun& run) {

@@ -1,4 +1,5 @@
-// Output of `tutti loops`: results.json, hypotheses.csv, the pictures and the table on the terminal.
+// Output of `tutti loops`: results.json, hypotheses.csv, the pictures, the table on the terminal, and with
+// --table every rule and every member on one image set, the paper's Table 1 for it.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/plot/plot.h"
 #include "apps/run/output_folder.h"
-#include "apps/tutti/files.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/evaluation.h"
 #include "tutti/loopclosure/ground_truth.h"
@@ -72,8 +73,6 @@ LoopReport EvaluateRun(const LoopRun& run);
 const char* LabelName(LoopLabel label);
 /// "accepted", "withdrawn", or empty.
 const char* SecondWordName(SecondWord word);
-/// A cell of a CSV file that may hold anything.
-std::string Quoted(const std::string& text);
 
 /// The figures of results.json, without the protocol.
 nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report);
@@ -84,9 +83,6 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run);
 /// What one run leaves in its folder, or a table of runs, each of which has a folder of its own in it.
 OutputLayout LoopsLayout(bool table = false);
 
-/// The loops that were accepted, one a line: both images with their files, probability, inliers.
-std::string FoundLoopsCsv(const LoopRun& run);
-
 /// Writes all files of a run and puts them into place. Returns where. Throws InputError that names those that
 /// can't be written.
 std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report, bool finished,
@@ -94,5 +90,56 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
 
 /// Prints the figures of one run.
 void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+
+// Pictures: colours that the colour-blind can tell apart (Okabe and Ito), and marks that differ in shape as
+// well.
+constexpr const char* kTrueColor = "#0072b2";    // blue
+constexpr const char* kFalseColor = "#d55e00";   // vermilion
+constexpr const char* kMissedColor = "#e69f00";  // orange
+
+/// Adds one result's kept posterior to a picture of `images` x `images`, scaled down where that is too large.
+void AddPosterior(const LoopResult& result, int images, cv::Mat& posterior);
+
+/// The curves of precision over recall: precision_recall.csv, and the picture.
+void WriteCurvesCsv(const LoopReport& report, const std::filesystem::path& file);
+CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report);
+
+/// Ground truth by overlap: recall over the overlap and the angle of the earlier view that shares most.
+void WriteRecallByViewCsv(const LoopReport& report, const std::filesystem::path& file);
+CurvePlot PlotRecallByView(const LoopRun& run, const LoopReport& report);
+
+/// Ground truth, posterior and what was said, side by side.
+void WriteConfusion(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file);
+
+/// Every false positive and every missed loop, up to a stated number: the image, what was proposed, and what
+/// the ground truth says. Reads the images again.
+void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file);
+
+/// "mean, 84 images of corridor, 44 with a loop", for titles.
+std::string RunTitle(const LoopRun& run, const LoopReport& report);
+
+/// One line of the table.
+struct LoopTableRow {
+  std::string rule;     ///< the word of --rule, and the name of its folder
+  bool single = false;  ///< a member alone
+  nlohmann::ordered_json figures;
+  LoopReport report;
+};
+
+struct LoopTable {
+  nlohmann::ordered_json protocol;
+  std::vector<int> loop_images;  ///< the images that have a loop; the tests are over them
+  std::vector<LoopTableRow> rows;
+};
+
+/// The words of --rule that the table runs: mean, product, majority, naive, and each member alone.
+std::vector<std::string> TableRules(const LoopDetectorOptions& options);
+
+/// Adds one rule's outcome, and what is common to all rules.
+void AddToTable(const LoopRun& run, const LoopReport& report, LoopTable& table);
+
+/// Prints the table and puts table.json, table.md and table.csv into place. Throws InputError if they can't
+/// be written.
+void WriteLoopTable(const LoopTable& table, OutputFolder& folder);
 
 }  // namespace tutti::cli

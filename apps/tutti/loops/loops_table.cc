@@ -1,8 +1,10 @@
-#include "apps/tutti/loops/loops_table.h"
-
+// The table of `tutti loops --table`.
 #include <algorithm>
 #include <cstdio>
 
+#include "apps/tutti/files.h"
+#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/text_table.h"
 #include "core/replaced_file.h"
 #include "tutti/core/significance.h"
 

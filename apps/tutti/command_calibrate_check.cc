@@ -6,7 +6,6 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/recording_options.h"
 #include "core/terminal.h"
-#include "tutti/core/error.h"
 #include "tutti/frontend/calibration_check.h"
 #include "tutti/slam/config.h"
 

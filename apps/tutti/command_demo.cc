@@ -14,7 +14,6 @@
 #include "apps/tutti/run_with_report.h"
 #include "core/terminal.h"
 #include "data/synthetic/synthetic_writer.h"
-#include "tutti/core/error.h"
 
 namespace tutti::cli {
 namespace {

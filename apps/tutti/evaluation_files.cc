@@ -1,5 +1,4 @@
 // Which files are compared: by option, by place, or those of a run.
-#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 

@@ -5,26 +5,17 @@
 #include <cctype>
 #include <iostream>
 
+#if defined(__GLIBC__) && defined(__GLIBCXX__)
+#define TUTTI_STDERR_CAN_BE_SET  // elsewhere stderr may not be assigned to
+#include <ext/stdio_sync_filebuf.h>
+#endif
+
 #include "core/terminal.h"
 
 namespace tutti::cli {
 namespace {
 
 constexpr std::size_t kMostAlike = 5, kMostKinds = 100, kMostLine = 1000;
-
-class FileBuffer : public std::streambuf {
- public:
-  explicit FileBuffer(std::FILE* file) : file_(file) {}
-
- protected:
-  int overflow(int c) override { return c == EOF ? 0 : std::fputc(c, file_); }
-  std::streamsize xsputn(const char* text, std::streamsize size) override {
-    return static_cast<std::streamsize>(std::fwrite(text, 1, static_cast<std::size_t>(size), file_));
-  }
-
- private:
-  std::FILE* file_;
-};
 
 std::string WithoutNumbers(const std::string& line) {
   std::string out;
@@ -45,7 +36,7 @@ std::string WithoutNumbers(const std::string& line) {
 
 ForeignLines::ForeignLines(bool quiet) : quiet_(quiet) {
   internal::StandardError();  // what it was before
-#ifdef __GLIBC__              // where stderr may be assigned to
+#ifdef TUTTI_STDERR_CAN_BE_SET
   cookie_io_functions_t functions = {};
   functions.write = [](void* self, const char* text, std::size_t size) {
     static_cast<ForeignLines*>(self)->Take(text, size);
@@ -56,7 +47,7 @@ ForeignLines::ForeignLines(bool quiet) : quiet_(quiet) {
   std::setvbuf(stream_, nullptr, _IONBF, 0);
   before_ = stderr;
   stderr = stream_;
-  buffer_ = std::make_unique<FileBuffer>(stream_);
+  buffer_ = std::make_unique<__gnu_cxx::stdio_sync_filebuf<char>>(stream_);
   cerr_ = std::cerr.rdbuf(buffer_.get());
 #endif
 }
@@ -64,7 +55,7 @@ ForeignLines::ForeignLines(bool quiet) : quiet_(quiet) {
 ForeignLines::~ForeignLines() {
   if (stream_ == nullptr) return;
   std::cerr.rdbuf(cerr_);
-#ifdef __GLIBC__
+#ifdef TUTTI_STDERR_CAN_BE_SET
   stderr = before_;
 #endif
   std::fclose(stream_);

@@ -1,7 +1,6 @@
 // The confusion picture of `tutti loops`: who was taken for whom.
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "apps/plot/plot_picture.h"

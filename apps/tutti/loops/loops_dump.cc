@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 
 #include "apps/tutti/files.h"
 #include "apps/tutti/text_table.h"

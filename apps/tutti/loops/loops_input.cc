@@ -1,7 +1,6 @@
 #include "apps/tutti/loops/loops_input.h"
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>

@@ -1,5 +1,7 @@
 #include "tests/apps/tutti/executable.h"
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -79,12 +81,24 @@ std::filesystem::path RunMadeOnce(const std::filesystem::path& config, const std
   });
 }
 
+std::string Done(const ProcessResult& run) {
+  EXPECT_EQ(run.status, 0) << run.output;
+  return run.output;
+}
+
+void ExpectRefusal(const ProcessResult& run, const std::vector<std::string>& words) {
+  EXPECT_EQ(run.status, 1) << run.output;
+  for (const std::string& word : words) EXPECT_THAT(run.output, ::testing::HasSubstr(word));
+}
+
 std::string ReadAll(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::stringstream text;
   text << in.rdbuf();
   return text.str();
 }
+
+nlohmann::json ReadJson(const std::filesystem::path& file) { return nlohmann::json::parse(ReadAll(file)); }
 
 void WriteAll(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;

@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,13 @@ std::filesystem::path RunMadeOnce(const std::filesystem::path& config, const std
 ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
                                 int signal);
 
+/// Expects that the program was content, and returns what it printed.
+std::string Done(const ProcessResult& run);
+/// Expects that it refused what it was told: status 1, and these words.
+void ExpectRefusal(const ProcessResult& run, const std::vector<std::string>& words);
+
 std::string ReadAll(const std::filesystem::path& file);
+nlohmann::json ReadJson(const std::filesystem::path& file);
 void WriteAll(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace tutti::testing

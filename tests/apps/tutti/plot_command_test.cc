@@ -14,6 +14,7 @@
 namespace tutti {
 namespace {
 
+using testing::Done;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -46,10 +47,10 @@ class PlotCommand : public ::testing::Test {
                               const std::vector<std::string>& more = {}) const {
     std::vector<std::string> arguments = {"plot",
                                           "--reference",
-                                          (folder_ / "reference.txt").string(),
+                                          folder_ / "reference.txt",
                                           "--estimate",
-                                          (folder_ / "good.txt").string(),
-                                          (folder_ / "bad.txt").string(),
+                                          folder_ / "good.txt",
+                                          folder_ / "bad.txt",
                                           "--what",
                                           what,
                                           "--out"};
@@ -62,8 +63,7 @@ class PlotCommand : public ::testing::Test {
 
 TEST_F(PlotCommand, EveryKindIsDrawnAsSvgAndPng) {
   for (const std::string what : {"trajectory", "error", "rpe"}) {
-    const auto run = Plot(what, {what + ".svg", what + ".png"});
-    ASSERT_EQ(run.status, 0) << run.output;
+    Done(Plot(what, {what + ".svg", what + ".png"}));
     const std::string svg = ReadAll(folder_ / (what + ".svg"));
     EXPECT_THAT(svg, AllOf(HasSubstr("good.txt"), HasSubstr("bad.txt"), HasSubstr("[m]"), HasSubstr("</svg>"),
                            HasSubstr(kBlue), HasSubstr(kVermilion), Not(HasSubstr("nan"))));
@@ -77,8 +77,7 @@ TEST_F(PlotCommand, WithoutAReferenceTheFilesAreDrawnAsTheyAre) {
   const std::string good = (folder_ / "good.txt").string(), bad = (folder_ / "bad.txt").string();
   for (const std::string what : {"trajectory", "xyz", "rpy", "speed"}) {
     const std::string svg = (folder_ / (what + ".svg")).string();
-    const auto run = RunTutti({"plot", good, bad, "--what", what, "--out", svg});
-    ASSERT_EQ(run.status, 0) << run.output;
+    Done(RunTutti({"plot", good, bad, "--what", what, "--out", svg}));
     EXPECT_THAT(ReadAll(svg), AllOf(HasSubstr("\ngood.txt\n"), HasSubstr("\nbad.txt\n"), HasSubstr("</svg>"),
                                     Not(HasSubstr("\nreference\n")), Not(HasSubstr("nan"))));
   }
@@ -97,8 +96,7 @@ TEST_F(PlotCommand, OverTimeTheReferenceIsDrawnToo) {
 
 TEST_F(PlotCommand, ErrorsAreDrawnOnTheMapAndAsDistributions) {
   for (const std::string what : {"error-map", "box", "violin"}) {
-    const auto run = Plot(what, {what + ".svg", what + ".png"});
-    ASSERT_EQ(run.status, 0) << run.output;
+    Done(Plot(what, {what + ".svg", what + ".png"}));
     EXPECT_THAT(ReadAll(folder_ / (what + ".svg")), AllOf(HasSubstr("[m]"), Not(HasSubstr("nan"))));
     EXPECT_FALSE(cv::imread((folder_ / (what + ".png")).string()).empty());
   }

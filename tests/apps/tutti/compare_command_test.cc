@@ -17,10 +17,10 @@
 namespace tutti {
 namespace {
 
-using testing::Done;
-using testing::ExpectRefusal;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ReadAll;
@@ -55,7 +55,7 @@ class CollectCommand : public ::testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunTutti(arguments);
   }
-  const fs::path folder_ = testing::FreshFolder();
+  const fs::path folder_ = testing::FreshFolder(), file_ = folder_ / "c.json";
 };
 
 // A report of a stranger, or of a disk that was full.
@@ -64,15 +64,14 @@ TEST_F(CollectCommand, ADamagedReportIsNamedAndTheTablesAreThere) {
   Summary("joint", 1, 0.5);
   const fs::path report = folder_ / "runs" / "jointcounts1" / "report.json", page = folder_ / "page.html";
   WriteAll(report, "{\"format\": 2, \"dataset\": [], \"variant\": 7}");
-  const std::string run = Done(Collect({"--report", page}));
-  EXPECT_THAT(run, AllOf(HasSubstr(report.string() + ": is damaged"), HasSubstr("Means over the runs")));
+  EXPECT_THAT(Done(Collect({"--report", page})),
+              AllOf(HasSubstr(report.string() + ": is damaged"), HasSubstr("Means over the runs")));
   EXPECT_THAT(ReadAll(page), HasSubstr("no charts"));
 }
 
 TEST_F(CollectCommand, NamesOfOthersDoNothingToTheTerminal) {
   Summary("joint\x1b[2J", 1, 0.5);
-  const std::string run = Done(Collect());
-  EXPECT_THAT(run, AllOf(HasSubstr("joint\\x1b[2J"), ::testing::Not(HasSubstr("\x1b"))));
+  EXPECT_THAT(Done(Collect()), AllOf(HasSubstr("joint\\x1b[2J"), ::testing::Not(HasSubstr("\x1b"))));
   const auto absent = RunTutti({"convert", folder_ / "no\x1b]0;x\a", "out.txt", "--to", "tum"});
   EXPECT_EQ(absent.status, 1);
   EXPECT_THAT(absent.output, AllOf(HasSubstr("no\\x1b]0;x\\x07"), ::testing::Not(HasSubstr("\x1b"))));
@@ -83,9 +82,8 @@ TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverFirstFrames) {
     Summary("odometry", start, start);                          // 1, 2, 3, 4, 5
     Summary("joint", start, 0.5 * start - 0.1 * (start == 2));  // 0.5, 0.9, 1.5, 2, 2.5
   }
-  const fs::path file = folder_ / "c.json";
-  const std::string run = Done(Collect({"--json", file}));
-  const auto json = testing::ReadJson(file);
+  const std::string run = Done(Collect({"--json", file_}));
+  const auto json = testing::ReadJson(file_);
   const auto variants = json["datasets"][0]["variants"];
   ASSERT_EQ(variants.size(), 2u);
   const auto& odometry = variants[variants[0]["variant"] == "odometry" ? 0 : 1];
@@ -143,9 +141,8 @@ TEST_F(CollectCommand, FewerThanFivePairsHaveNoP) {
     Summary("odometry", start, 1 + 0.01 * start);
     Summary("joint", start, 0.5);
   }
-  const fs::path file = folder_ / "c.json";
-  const std::string run = Done(Collect({"--json", file}));
-  const auto variants = testing::ReadJson(file)["datasets"][0]["variants"];
+  const std::string run = Done(Collect({"--json", file_}));
+  const auto variants = testing::ReadJson(file_)["datasets"][0]["variants"];
   for (const auto& variant : variants) EXPECT_FALSE(variant["ate_minus_ensemble"].contains("p"));
   EXPECT_THAT(run, AllOf(HasSubstr("but these runs can't tell them apart (p >= 0.05, or fewer than 5 pairs)"),
                          Not(HasSubstr("p < 0.05"))));
@@ -156,8 +153,7 @@ TEST_F(CollectCommand, TimePerStageIsATableOfItsOwnInEveryFormat) {
     Summary("joint", start, 0.5);
     Summary("orb", start, 0.6);
   }
-  const fs::path file = folder_ / "c.json";
-  const std::string text = Done(Collect({"--json", file}));
+  const std::string text = Done(Collect({"--json", file_}));
   const std::string stages = text.substr(text.find("Time per stage:"));
   EXPECT_THAT(stages, ::testing::ContainsRegex("stage \\[s\\] +ensemble +orb"));
   EXPECT_THAT(stages, ::testing::ContainsRegex("odometry_track +1.00 \\+- 0.00 +1.00 \\+- 0.00"));
@@ -167,7 +163,7 @@ TEST_F(CollectCommand, TimePerStageIsATableOfItsOwnInEveryFormat) {
   EXPECT_THAT(text.substr(0, text.find("Time per stage:")), Not(HasSubstr("loop_verify")));
   EXPECT_THAT(Collect({"--table-format", "markdown"}).output, HasSubstr("| stage [s]"));
   EXPECT_THAT(Collect({"--table-format", "latex"}).output, HasSubstr("odometry\\_track & 1.00 $\\pm$ 0.00"));
-  const auto variant = testing::ReadJson(file)["datasets"][0]["variants"][0];
+  const auto variant = testing::ReadJson(file_)["datasets"][0]["variants"][0];
   EXPECT_NEAR(variant["stages_s"]["loop_verify"]["mean"].get<double>(), 0.5, 1e-12);
 }
 
@@ -177,9 +173,8 @@ TEST_F(CollectCommand, WaitingAndWorkOnTheCallersThreadAreNotCountedTwice) {
   auto json = testing::ReadJson(summary);
   json["timing"]["stage_ms"]["loop_inline"] = 500;  // one thread: what all loop_ stages took
   WriteAll(summary, json.dump());
-  const fs::path file = folder_ / "c.json";
-  ASSERT_EQ(Collect({"--json", file}).status, 0);
-  const auto variant = testing::ReadJson(file)["datasets"][0]["variants"][0];
+  Done(Collect({"--json", file_}));
+  const auto variant = testing::ReadJson(file_)["datasets"][0]["variants"][0];
   EXPECT_NEAR(variant["loops_s"]["mean"].get<double>(), 0.5, 1e-12);
 }
 
@@ -199,10 +194,9 @@ TEST_F(CollectCommand, TheMeanOfStandardisedEvidenceIsAVariantOfItsOwn) {
   Summary("mean", 1, 0.6);
   Summary("mean", 2, 0.7, "standardised");
   Summary("mean", 3, 0.8, "");  // before there was a choice
-  const fs::path file = folder_ / "c.json";
-  ASSERT_EQ(Collect({"--json", file}).status, 0);
+  Done(Collect({"--json", file_}));
   std::map<std::string, std::size_t> runs;
-  const auto json = testing::ReadJson(file);
+  const auto json = testing::ReadJson(file_);
   for (const auto& variant : json["datasets"][0]["variants"])
     runs[variant["variant"]] = variant["samples"].size();
   EXPECT_EQ(runs,
@@ -212,8 +206,8 @@ TEST_F(CollectCommand, TheMeanOfStandardisedEvidenceIsAVariantOfItsOwn) {
 TEST_F(CollectCommand, OneRunHasNoIntervalAndNoTest) {
   Summary("joint", 1, 0.5);
   Summary("orb", 1, 0.6);
-  const std::string run = Done(Collect({"--table-format", "markdown"}));
-  EXPECT_THAT(run, AllOf(HasSubstr("| orb"), HasSubstr(" 0.6000 |"), Not(HasSubstr("nan"))));
+  EXPECT_THAT(Done(Collect({"--table-format", "markdown"})),
+              AllOf(HasSubstr("| orb"), HasSubstr(" 0.6000 |"), Not(HasSubstr("nan"))));
 }
 
 TEST_F(CollectCommand, ARunWhoseDataSetHasNoNameIsInTheTable) {
@@ -223,8 +217,7 @@ TEST_F(CollectCommand, ARunWhoseDataSetHasNoNameIsInTheTable) {
     nlohmann::json json = testing::ReadJson(file);
     json["dataset"] = nlohmann::json::parse(name);
     WriteAll(file, json.dump());
-    const std::string run = Done(Collect());
-    EXPECT_THAT(run, HasSubstr("0.5000"));
+    EXPECT_THAT(Done(Collect()), HasSubstr("0.5000"));
   }
 }
 
@@ -239,12 +232,25 @@ TEST_F(CollectCommand, WhatIsNoRunIsRefused) {
   }
 }
 
-TEST(CompareCommand, RunsEveryVariantFromEveryFirstFrameAndWritesTheTable) {
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  Done(
-      RunTutti({"compare", "--config", testing::TinyConfig(folder), "--dataset", testing::TinyTown(), "--out",
-                out, "--variants", "odometry,orb,ensemble", "--runs", "2", "--noise", "1", "--end", "12"}));
-  const auto json = testing::ReadJson(out / "comparison.json");
+class CompareCommand : public testing::TownTest {
+ protected:
+  // `tutti compare` on these data sets.
+  testing::ProcessResult Compare(const std::vector<std::string>& datasets, const std::string& variants,
+                                 const std::vector<std::string>& more) const {
+    std::vector<std::string> words = {"compare", "--config",   config_,  "--out",
+                                      out_,      "--variants", variants, "--dataset"};
+    words.insert(words.end(), datasets.begin(), datasets.end());
+    words.insert(words.end(), more.begin(), more.end());
+    return RunTutti(words);
+  }
+  nlohmann::json Comparison() const { return testing::ReadJson(out_ / "comparison.json"); }
+  const std::string town_ = testing::TinyTown();
+};
+
+TEST_F(CompareCommand, RunsEveryVariantFromEveryFirstFrameAndWritesTheTable) {
+  const fs::path& out = out_;
+  Done(Compare({town_}, "odometry,orb,ensemble", {"--runs", "2", "--noise", "1", "--end", "12"}));
+  const auto json = Comparison();
   const auto variants = json["datasets"][0]["variants"];
   ASSERT_EQ(variants.size(), 3u);
   EXPECT_EQ(json["datasets"][0]["varies"],
@@ -265,42 +271,37 @@ TEST(CompareCommand, RunsEveryVariantFromEveryFirstFrameAndWritesTheTable) {
     EXPECT_EQ(ReadAll(out / variant / "run_2" / "trajectory.txt"), trajectory) << variant;
   EXPECT_THAT(ReadAll(out / "comparison.md"), HasSubstr("| ensemble"));
   // The table again from the folders.
-  const std::string collected = Done(RunTutti({"collect", out}));
-  EXPECT_THAT(collected, HasSubstr("ensemble"));
+  EXPECT_THAT(Done(RunTutti({"collect", out})), HasSubstr("ensemble"));
 }
 
 // The map is adjusted in the end, for which CHOLMOD would start threads. The thread sanitizer ends a copy of
 // a process that had some; without it, all that can be seen is that no copy waits for them.
-TEST(CompareCommand, VariantsAreCopiesOfAProcessWithoutOtherThreads) {
+TEST_F(CompareCommand, VariantsAreCopiesOfAProcessWithoutOtherThreads) {
   SyntheticOptions options = testing::SmallStereoTown(320, 160);
   options.frames = 40;
-  const fs::path town = testing::GeneratedDataset(options), out = testing::FreshFolder() / "out";
-  Done(RunTutti({"compare", "--config", town / "config.yaml", "--dataset", town, "--out", out, "--variants",
+  const fs::path town = testing::GeneratedDataset(options);
+  Done(RunTutti({"compare", "--config", town / "config.yaml", "--dataset", town, "--out", out_, "--variants",
                  "odometry,orb", "--runs", "1"}));
-  const auto json = testing::ReadJson(out / "comparison.json");
+  const auto json = Comparison();
   for (const auto& variant : json["datasets"][0]["variants"]) EXPECT_EQ(variant["failures"].size(), 0u);
 }
 
-TEST(CompareCommand, SeveralDataSetsMakeOneTable) {
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  const fs::path other = folder / "other";
-  fs::create_directory_symlink(fs::absolute(testing::TinyTown()), other);
-  const std::string run =
-      Done(RunTutti({"compare", "--config", testing::TinyConfig(folder), "--dataset", testing::TinyTown(),
-                     other, "--out", out, "--variants", "odometry,orb", "--runs", "1", "--end", "8"}));
-  const auto json = testing::ReadJson(out / "comparison.json");
+TEST_F(CompareCommand, SeveralDataSetsMakeOneTable) {
+  const fs::path other = folder_ / "other";
+  fs::create_directory_symlink(fs::absolute(town_), other);
+  const std::string run = Done(Compare({town_, other}, "odometry,orb", {"--runs", "1", "--end", "8"}));
+  const auto json = Comparison();
   ASSERT_EQ(json["datasets"].size(), 1u);
   EXPECT_EQ(json["datasets"][0]["varies"], "the data set (2)");
   EXPECT_EQ(json["datasets"][0]["variants"][1]["samples"].size(), 2u);
   EXPECT_THAT(run, HasSubstr(" and 1 more"));
 }
 
-TEST(CompareCommand, ARecordingThatSaysWhatItIsNeedsNoOption) {
-  const testing::InFolder here(testing::FreshFolder());
+TEST_F(CompareCommand, ARecordingThatSaysWhatItIsNeedsNoOption) {
+  const testing::InFolder here(folder_);
   const fs::path town = fs::absolute(testing::CopyOfTinyTown("town"));
-  const std::string run =
-      Done(RunTutti({"compare", town, "--variants", "odometry,orb", "--runs", "1", "--end", "8"}));
-  EXPECT_THAT(run, HasSubstr("  camera "));
+  EXPECT_THAT(Done(RunTutti({"compare", town, "--variants", "odometry,orb", "--runs", "1", "--end", "8"})),
+              HasSubstr("  camera "));
   EXPECT_TRUE(fs::exists("tutti-out/town-compared/comparison.json"));
   // Images alone do not say what the camera is.
   ExpectRefusal(RunTutti({"compare", town / "image_0", "--out", "out"}),
@@ -308,35 +309,20 @@ TEST(CompareCommand, ARecordingThatSaysWhatItIsNeedsNoOption) {
   EXPECT_FALSE(fs::exists("out"));
 }
 
-TEST(CompareCommand, BadInputIsRefusedBeforeTheFirstRun) {
-  const fs::path folder = testing::FreshFolder();
-  const std::string config = testing::TinyConfig(folder).string(), out = (folder / "out").string();
-  const auto compare = [&](const fs::path& dataset, const std::string& variants) {
-    return RunTutti(
-        {"compare", "--config", config, "--dataset", dataset, "--out", out, "--variants", variants});
-  };
-  const auto unknown = compare(testing::TinyTown(), "odometry,bag");
-  EXPECT_EQ(unknown.status, 1);
-  EXPECT_THAT(unknown.output, AllOf(StartsWith("tutti: --variants: 'bag'"), HasSubstr("Known")));
-  EXPECT_THAT(compare(testing::TinyTown(), "orb,orb").output, HasSubstr("named twice"));
-  EXPECT_THAT(compare(folder / "nowhere", "orb").output, AllOf(StartsWith("tutti: "), HasSubstr("nowhere")));
+TEST_F(CompareCommand, BadInputIsRefusedBeforeTheFirstRun) {
+  ExpectRefusal(Compare({town_}, "odometry,bag", {}), {"tutti: --variants: 'bag'", "Known"});
+  ExpectRefusal(Compare({town_}, "orb,orb", {}), {"named twice"});
+  ExpectRefusal(Compare({folder_ / "nowhere"}, "orb", {}), {"tutti: ", "nowhere"});
   // Less than nothing is no large number.
-  for (const char* option : {"--runs", "--end", "--start", "--noise"}) {
-    ExpectRefusal(RunTutti({"compare", "--config", config, "--dataset", testing::TinyTown(), "--out", out,
-                            "--variants", "orb", option, "-1"}),
-                  {option, "'-1'"});
-  }
-  EXPECT_FALSE(fs::exists(out));
+  for (const char* option : {"--runs", "--end", "--start", "--noise"})
+    ExpectRefusal(Compare({town_}, "orb", {option, "-1"}), {option, "'-1'"});
+  EXPECT_FALSE(fs::exists(out_));
 }
 
-TEST(CompareCommand, ARunThatFailsIsReportedAndTheTableStillWritten) {
-  const fs::path folder = testing::FreshFolder();
-  ExpectRefusal(RunTutti({"compare", "--config", testing::TinyConfig(folder), "--dataset",
-                          testing::TinyTown(), "--out", folder / "out", "--variants", "odometry,orb",
-                          "--runs", "1", "--ground-truth", folder / "none.txt"}),
+TEST_F(CompareCommand, ARunThatFailsIsReportedAndTheTableStillWritten) {
+  ExpectRefusal(Compare({town_}, "odometry,orb", {"--runs", "1", "--ground-truth", folder_ / "none.txt"}),
                 {"none.txt", "0 (1 failed)"});
-  const auto json = testing::ReadJson(folder / "out" / "comparison.json");
-  EXPECT_EQ(json["datasets"][0]["variants"][1]["failures"].size(), 1u);
+  EXPECT_EQ(Comparison()["datasets"][0]["variants"][1]["failures"].size(), 1u);
 }
 
 }  // namespace

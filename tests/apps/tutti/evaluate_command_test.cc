@@ -13,9 +13,9 @@
 namespace tutti {
 namespace {
 
-using testing::Done;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ReadAll;
@@ -157,10 +157,11 @@ TEST_F(EvaluateCommand, DegenerateInputNamesFileAndLine) {
   ExpectRefused(evaluate("1000 0 0 0 0 0 0 1\n1000.1 1 0 0 0 0 0 1\n1000.2 2 0 0 0 0 0 1\n"),
                 {"bad.txt", "on a line"});
   ExpectRefused(evaluate("1000 0 0 0 0 0 0 1\n1000.1 1e308 0 0 0 0 0 1\n"), {"bad.txt:2:", "too large"});
-  const std::string repeated = Done(
-      evaluate("1000 20 0 0 0 0 0 1\n1000 20 0 0 0 0 0 1\n1000.1 20 1 0 0 0 0 2\n1000.2 19 2 1 0 0 0 1\n"));
-  EXPECT_THAT(repeated, AllOf(HasSubstr("bad.txt:2: repeats the time stamp"),
-                              HasSubstr("bad.txt:3: the quaternion is not of length 1")));
+  EXPECT_THAT(
+      Done(evaluate(
+          "1000 20 0 0 0 0 0 1\n1000 20 0 0 0 0 0 1\n1000.1 20 1 0 0 0 0 2\n1000.2 19 2 1 0 0 0 1\n")),
+      AllOf(HasSubstr("bad.txt:2: repeats the time stamp"),
+            HasSubstr("bad.txt:3: the quaternion is not of length 1")));
 }
 
 TEST_F(EvaluateCommand, StampsOfAnyUnitAreSaidOnceAndConvertedWithoutLoss) {

@@ -13,10 +13,10 @@
 namespace tutti {
 namespace {
 
-using testing::Done;
-using testing::ExpectRefusal;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
@@ -38,9 +38,9 @@ fs::path SixImages(const cv::Size& size = {64, 48}) {
 
 TEST(GenerateFromImages, KeepsTheNamesAndCopiesImagesBeforeChangeFromByteForByte) {
   const fs::path from = SixImages(), out = from.parent_path() / "out";
-  const std::string run = Done(RunTutti({"generate", "--from-images", from, "--out", out, "--change",
-                                         "dark:2", "--change-from", "2", "--threads", "2"}));
-  EXPECT_THAT(run, HasSubstr("6 images, changed by dark:2 from image 2 on"));
+  EXPECT_THAT(Done(RunTutti({"generate", "--from-images", from, "--out", out, "--change", "dark:2",
+                             "--change-from", "2", "--threads", "2"})),
+              HasSubstr("6 images, changed by dark:2 from image 2 on"));
   for (const char* name : {"8.5.bmp", "9.5.bmp"}) EXPECT_EQ(ReadAll(out / name), ReadAll(from / name));
   for (const char* stem : {"10.5", "11.5", "12.5", "13.5"}) {
     const cv::Mat changed = cv::imread((out / stem).string() + ".png", cv::IMREAD_UNCHANGED);
@@ -70,9 +70,9 @@ TEST(GenerateFromImages, APictureOfAnotherTypeIsNoImageAsForTheOtherCommands) {
   cv::randu(image, 0, 256);
   for (int i = 1; i <= 11; ++i) cv::imwrite((from / (std::to_string(i) + ".jpg")).string(), image);
   cv::imwrite((from / "ground_truth.bmp").string(), image);
-  const std::string made =
-      Done(RunTutti({"generate", "--from-images", from, "--out", folder / "out", "--change", "dark"}));
-  EXPECT_THAT(made, AllOf(HasSubstr("11 images, changed"), HasSubstr("1 .bmp image(s) among 12")));
+  EXPECT_THAT(
+      Done(RunTutti({"generate", "--from-images", from, "--out", folder / "out", "--change", "dark"})),
+      AllOf(HasSubstr("11 images, changed"), HasSubstr("1 .bmp image(s) among 12")));
   const auto loops = RunTutti({"loops", from, "--out", folder / "loops"});
   EXPECT_EQ(loops.status, 0) << loops.output;
   EXPECT_THAT(loops.output, HasSubstr("1 .bmp image(s) among 12"));
@@ -124,21 +124,17 @@ TEST(GenerateFromImages, WhatCanNotBeDoneIsSaidBeforeAnythingIsWritten) {
 
 TEST(GenerateFromImages, NeverWritesIntoTheFolderItReadsFrom) {
   const fs::path from = SixImages();
-  const auto run =
-      RunTutti({"generate", "--from-images", from, "--out", from, "--change", "dark", "--force"});
-  EXPECT_NE(run.status, 0);
-  EXPECT_THAT(run.output, HasSubstr("give another folder"));
+  ExpectRefusal(RunTutti({"generate", "--from-images", from, "--out", from, "--change", "dark", "--force"}),
+                {"give another folder"});
   EXPECT_TRUE(fs::exists(from / "8.5.bmp"));
 }
 
 TEST(GenerateFromImages, ADamagedImageIsNamed) {
   const fs::path from = SixImages();
   WriteAll(from / "10.5.bmp", "BM, but no more");
-  const auto run =
-      RunTutti({"generate", "--from-images", from, "--out", from.parent_path() / "out", "--change", "blur"});
-  EXPECT_NE(run.status, 0);
-  EXPECT_LT(run.status, 128);
-  EXPECT_THAT(run.output, HasSubstr("10.5.bmp"));
+  ExpectRefusal(
+      RunTutti({"generate", "--from-images", from, "--out", from.parent_path() / "out", "--change", "blur"}),
+      {"10.5.bmp"});
 }
 
 TEST(GenerateFromImages, ForceRemovesTheOldImagesAndNoOthers) {

@@ -15,9 +15,9 @@
 namespace tutti {
 namespace {
 
-using testing::Done;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ReadAll;
@@ -65,8 +65,7 @@ TEST_F(HardInput, ATrajectoryIsTheSameWithMarkCarriageReturnsAndCommas) {
   for (const std::string& text : {kMark + Tum(), Replaced(Tum(), '\n', "\r\n"), Replaced(Tum(), ' ', ","),
                                   Replaced(Tum(), ' ', ", ")}) {
     const fs::path other = File("other.txt", text), out = folder_ / "out.txt";
-    const std::string run = Done(RunTutti({"convert", other, out, "--to", "tum"}));
-    EXPECT_THAT(run, HasSubstr("(tum)"));
+    EXPECT_THAT(Done(RunTutti({"convert", other, out, "--to", "tum"})), HasSubstr("(tum)"));
     ASSERT_EQ(RunTutti({"convert", plain, folder_ / "as_is.txt", "--to", "tum"}).status, 0);
     EXPECT_EQ(ReadAll(out), ReadAll(folder_ / "as_is.txt"));
   }
@@ -112,9 +111,8 @@ TEST_F(HardInput, LongWordsAreCutOff) {
 TEST_F(HardInput, WhereNothingCanMoveThereAreNoIterations) {
   const fs::path graph = File("fixed.g2o", Graph("FIX 0\nFIX 1\n"));
   for (const char* solver : {"ceres", "block"}) {
-    const std::string run =
-        Done(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o", "--solver", solver}));
-    EXPECT_THAT(run, HasSubstr("after 0 iterations"));
+    EXPECT_THAT(Done(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o", "--solver", solver})),
+                HasSubstr("after 0 iterations"));
   }
 }
 
@@ -293,16 +291,13 @@ TEST_F(HardInput, WhatRanOutIsSaid) {
 #ifdef TUTTI_SANITIZED
   GTEST_SKIP() << "sanitizers need more addresses than the limit leaves";
 #endif
-  const auto limited = [&](const std::string& limit, std::vector<std::string> arguments) {
-    std::vector<std::string> shell = {"-c", "ulimit " + limit + "; exec \"$0\" \"$@\"", TUTTI_EXECUTABLE};
-    shell.insert(shell.end(), arguments.begin(), arguments.end());
-    return testing::RunProgramAndSignal("/bin/sh", shell, "", 0);
-  };
   std::string long_graph;
   for (int i = 0; i < 300000; ++i)
     long_graph += "EDGE_SE2 " + std::to_string(i) + " " + std::to_string(i + 1) + " 1 0 0 1 0 0 1 0 1\n";
-  ExpectRefused(limited("-v 150000", {"optimize", File("long.g2o", long_graph), "--out", folder_ / "o"}),
-                "not enough memory");
+  const fs::path graph = File("long.g2o", long_graph);
+  ExpectRefused(
+      testing::RunInShell("ulimit -v 150000; exec \"$@\"", {"optimize", graph, "--out", folder_ / "o"}),
+      "not enough memory");
 }
 
 }  // namespace

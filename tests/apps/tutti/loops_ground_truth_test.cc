@@ -126,16 +126,9 @@ class LoopsByOverlap : public testing::LoopsFixture {
     WriteAll(folder / "groundtruth.txt", truth);
   }
   testing::ProcessResult Loops(const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments = {"loops",
-                                          folder_ / "set",
-                                          "--rule",
-                                          "orb",
-                                          "--out",
-                                          out_,
-                                          "--ground-truth-overlap",
-                                          "0.3",
-                                          "--ground-truth",
-                                          folder_ / "set" / "groundtruth.txt"};
+    std::vector<std::string> arguments = {"loops", folder_ / "set", "--rule", "orb", "--out", out_};
+    arguments.insert(arguments.end(), {"--ground-truth-overlap", "0.3", "--ground-truth",
+                                       folder_ / "set" / "groundtruth.txt"});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return testing::RunTutti(arguments);
   }
@@ -202,8 +195,7 @@ TEST_F(LoopsMemory, ALaterRunWithTheSameMemoryFindsLoopsIntoTheImagesOfTheFirst)
       return RunTutti({"loops", "--images", later, "--ground-truth", Truth({}, kAgain).string(), "--out", out,
                        way[0], way[1]});
     };
-    const std::string run = Done(go_on());
-    EXPECT_THAT(run, HasSubstr("4 images, into 15"));
+    EXPECT_THAT(Done(go_on()), HasSubstr("4 images, into 15"));
     const nlohmann::json json = Json(out / "results.json");
     EXPECT_EQ(json["earlier"]["images"], kLoopPlaces);
     EXPECT_EQ(json["earlier"]["loops"], kAgain);

@@ -119,8 +119,7 @@ TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
   ASSERT_EQ(mapped(town_, next_, {"--start", "90", "--end", "190"}), 0);
   const std::string day = (day_ / "map.tutti").string(), next = (next_ / "map.tutti").string(),
                     both = (folder_ / "both.tutti").string();
-  const std::string merged = Done(RunTutti({"merge", day, next, "-o", both}));
-  EXPECT_THAT(merged, HasSubstr("2 sessions"));
+  EXPECT_THAT(Done(RunTutti({"merge", day, next, "-o", both})), HasSubstr("2 sessions"));
   const json info = json::parse(RunTutti({"map", "info", both, "--json", "--check"}).output);
   EXPECT_EQ(info["sessions"].size(), 2u);
   EXPECT_EQ(info["submaps"], 1);

@@ -42,10 +42,7 @@ class NothingLost : public ::testing::Test {
   }
   // Through a shell, which sets something before.
   testing::ProcessResult RunAfter(const std::string& command, const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {"-c", command + " \"$0\" \"$@\"", TUTTI_EXECUTABLE};
-    const std::vector<std::string> arguments = Arguments(more);
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    return testing::RunProgramAndSignal("/bin/sh", words, "", 0);
+    return testing::RunInShell(command + " \"$@\"", Arguments(more));
   }
   // Of the result, without what is hidden or grows.
   std::map<std::string, std::string> Files() const {
@@ -209,11 +206,12 @@ class FaultsWhileRunning : public ::testing::Test {
   Trajectory Poses(const std::string& out) const {
     return ReadTrajectory(folder_ / out / "trajectory.txt", TrajectoryFormat::kTum);
   }
-  // In a shell: "$@" is the run.
+  void ExpectSameBytes(const char* a, const char* b) const {
+    for (const char* file : {"trajectory.txt", "loops.csv", "graph.g2o"})
+      EXPECT_EQ(ReadAll(folder_ / a / file), ReadAll(folder_ / b / file)) << file;
+  }
   testing::ProcessResult InShell(const std::string& script, const std::string& out) const {
-    std::vector<std::string> words = {"-c", script, "sh", TUTTI_EXECUTABLE};
-    for (const std::string& word : Arguments(out)) words.push_back(word);
-    return testing::RunProgramAndSignal("/bin/sh", words, "", 0);
+    return testing::RunInShell(script, Arguments(out));
   }
 
   const fs::path folder_ = testing::FreshFolder(), town_ = testing::CopyOfTinyTown(folder_ / "town");
@@ -226,8 +224,8 @@ TEST_F(FaultsWhileRunning, ADayBetweenTwoFramesIsSaidAndTheRunGoesOn) {
   for (int i = 0; times >> stamp_s; ++i)
     moved << std::fixed << std::setprecision(6) << stamp_s + (i < 15 ? 0 : 86400) << "\n";
   testing::WriteAll(town_ / "times.txt", moved.str());
-  const std::string run = Done(testing::RunTutti(Arguments("out")));
-  EXPECT_THAT(run, HasSubstr("frame 15 comes 86400 s after the one before it"));
+  EXPECT_THAT(Done(testing::RunTutti(Arguments("out"))),
+              HasSubstr("frame 15 comes 86400 s after the one before it"));
   EXPECT_EQ(Poses("out").size(), static_cast<std::size_t>(testing::kTinyFrames));
 }
 
@@ -235,8 +233,7 @@ TEST_F(FaultsWhileRunning, AProcessThatIsStoppedForASecondGoesOnWithTheSameBytes
   ASSERT_EQ(testing::RunTutti(Arguments("quiet")).status, 0);
   Done(InShell(R"("$@" & run=$!; sleep 0.3; kill -STOP $run || exit 99; sleep 1; kill -CONT $run; wait $run)",
                "held"));
-  for (const char* file : {"trajectory.txt", "loops.csv", "graph.g2o"})
-    EXPECT_EQ(testing::ReadAll(folder_ / "held" / file), testing::ReadAll(folder_ / "quiet" / file)) << file;
+  ExpectSameBytes("held", "quiet");
 }
 
 // Waiting, writing checkpoints and keeping pace go by a clock that nobody can set.
@@ -251,9 +248,7 @@ TEST_F(FaultsWhileRunning, AClockThatIsSetBackAgainAndAgainChangesNothing) {
   EXPECT_LT(second, first - 80000) << "the clock is not set back";
   ASSERT_EQ(testing::RunTutti(Arguments("quiet")).status, 0);
   Done(InShell("LD_PRELOAD='" TUTTI_CLOCK_SET_BACK "' \"$@\" --checkpoint 0.1 --follow 1", "set_back"));
-  for (const char* file : {"trajectory.txt", "loops.csv", "graph.g2o"})
-    EXPECT_EQ(testing::ReadAll(folder_ / "set_back" / file), testing::ReadAll(folder_ / "quiet" / file))
-        << file;
+  ExpectSameBytes("set_back", "quiet");
 }
 
 TEST_F(FaultsWhileRunning, AFolderThatStallsIsWaitedFor) {

@@ -14,9 +14,9 @@
 namespace tutti {
 namespace {
 
-using testing::Done;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ReadAll;
@@ -45,15 +45,9 @@ class PlotCommand : public ::testing::Test {
   }
   testing::ProcessResult Plot(const std::string& what, const std::vector<std::string>& files,
                               const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"plot",
-                                          "--reference",
-                                          folder_ / "reference.txt",
-                                          "--estimate",
-                                          folder_ / "good.txt",
-                                          folder_ / "bad.txt",
-                                          "--what",
-                                          what,
-                                          "--out"};
+    std::vector<std::string> arguments = {"plot", "--reference", folder_ / "reference.txt"};
+    arguments.insert(arguments.end(), {"--estimate", folder_ / "good.txt", folder_ / "bad.txt"});
+    arguments.insert(arguments.end(), {"--what", what, "--out"});
     for (const std::string& file : files) arguments.push_back((folder_ / file).string());
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunTutti(arguments);

@@ -16,10 +16,10 @@
 namespace tutti {
 namespace {
 
-using testing::Done;
-using testing::ExpectRefusal;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
@@ -36,10 +36,7 @@ class Resume : public ::testing::Test {
   }
   // Killed after so many seconds, unless it is at its end before.
   static testing::ProcessResult KilledAfter(double seconds, const std::vector<std::string>& arguments) {
-    std::vector<std::string> words = {
-        "-c", "exec timeout -s KILL " + std::to_string(seconds) + " \"$0\" \"$@\"", TUTTI_EXECUTABLE};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    return testing::RunProgramAndSignal("/bin/sh", words, "", 0);
+    return testing::RunInShell("exec timeout -s KILL " + std::to_string(seconds) + " \"$@\"", arguments);
   }
   static void ExpectTheSame(const fs::path& a, const fs::path& b) {
     for (const char* name : kResults) EXPECT_EQ(ReadAll(a / name) == ReadAll(b / name), true) << name;
@@ -152,8 +149,8 @@ TEST_F(Resume, EachRunLeavesAMapUnlessToldNotTo) {
 TEST_F(Resume, MapInfoTellsWhatIsInAMapAndChecksIt) {
   ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5"})).status, 0);
   const fs::path map = out_ / "map.tutti";
-  const std::string text = Done(RunTutti({"map", "info", map, "--check"}));
-  EXPECT_THAT(text, AllOf(HasSubstr("keyframes"), HasSubstr("stereo"), HasSubstr("checksums are right")));
+  EXPECT_THAT(Done(RunTutti({"map", "info", map, "--check"})),
+              AllOf(HasSubstr("keyframes"), HasSubstr("stereo"), HasSubstr("checksums are right")));
   const auto info = nlohmann::json::parse(RunTutti({"map", "info", map, "--json"}).output);
   EXPECT_EQ(info["frames"], 5);
   EXPECT_GT(info["landmarks"], 50);

@@ -26,16 +26,16 @@ using testing::ReadAll;
 using testing::RunTutti;
 using ::testing::StartsWith;
 
-nlohmann::json Summary(const fs::path& out) { return testing::ReadJson(out / "summary.json"); }
+class RunCommand : public testing::TownTest {
+ protected:
+  std::string Poses(const std::string& out, const std::string& name = "trajectory.txt") const {
+    return ReadAll(folder_ / out / name);
+  }
+};
 
-std::vector<std::string> Arguments(const fs::path& config, const fs::path& dataset, const fs::path& out) {
-  return {"run", "--config", config, "--dataset", dataset, "--out", out};
-}
-
-TEST(RunCommand, WritesEverythingThatScriptsRelyOn) {
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  const auto run = RunTutti(Arguments(testing::TinyConfig(folder), testing::TinyTown(), out));
-  ASSERT_EQ(run.status, 0) << run.output;
+TEST_F(RunCommand, WritesEverythingThatScriptsRelyOn) {
+  const std::string run = Done(Run("out"));
+  const fs::path& out = out_;
   const Trajectory trajectory = ReadTrajectory(out / "trajectory.txt", TrajectoryFormat::kTum);
   EXPECT_EQ(trajectory.size(), static_cast<std::size_t>(testing::kTinyFrames));
   EXPECT_EQ(ReadAll(out / "trajectory.txt"), ReadAll(out / "trajectory_odometry.txt"));  // no loop in it
@@ -46,7 +46,7 @@ TEST(RunCommand, WritesEverythingThatScriptsRelyOn) {
   EXPECT_THAT(ReadAll(out / "trajectory.svg"), HasSubstr("reference"));
   EXPECT_GT(fs::file_size(out / "trajectory.png"), 1000u);
 
-  const nlohmann::json s = Summary(out);
+  const nlohmann::json s = Summary();
   EXPECT_EQ(s["frames"]["total"], testing::kTinyFrames);
   EXPECT_EQ(s["frames"]["tracked"], testing::kTinyFrames);
   EXPECT_EQ(s["frames"]["bad"], 0);
@@ -71,131 +71,97 @@ TEST(RunCommand, WritesEverythingThatScriptsRelyOn) {
   EXPECT_EQ(s["seed"], 1);
   EXPECT_FALSE(s["version"].get<std::string>().empty());
   EXPECT_EQ(s["health"]["word"], "good") << s["health"];
-  EXPECT_THAT(run.output, HasSubstr("  good: nothing that the run shows"));
+  EXPECT_THAT(run, HasSubstr("  good: nothing that the run shows"));
 }
 
-// Of two runs, byte for byte.
-void ExpectTheSameResults(const fs::path& one, const fs::path& other) {
-  for (const char* name : {"trajectory.txt", "keyframes.txt", "loops.csv", "graph.g2o"}) {
-    EXPECT_EQ(ReadAll(one / name), ReadAll(other / name)) << name;
-  }
-  EXPECT_FALSE(ReadAll(one / "trajectory.txt").empty());
+TEST_F(RunCommand, SameBytesForOneAndTwoThreadsAndWithoutLoops) {
+  Done(Run("one", {"--threads", "1"}));
+  Done(Run("two", {"--threads", "2"}));
+  Done(Run("odometry", {"--no-loops"}));
+  for (const char* name : {"trajectory.txt", "keyframes.txt", "loops.csv", "graph.g2o"})
+    EXPECT_EQ(Poses("one", name), Poses("two", name)) << name;
+  EXPECT_FALSE(Poses("one").empty());
+  EXPECT_EQ(Poses("one", "trajectory_odometry.txt"), Poses("odometry"));
 }
 
-TEST(RunCommand, SameBytesForOneAndTwoThreadsAndWithoutLoops) {
-  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
-  auto one = Arguments(config, testing::TinyTown(), folder / "one");
-  one.insert(one.end(), {"--threads", "1"});
-  auto two = Arguments(config, testing::TinyTown(), folder / "two");
-  two.insert(two.end(), {"--threads", "2"});
-  auto odometry = Arguments(config, testing::TinyTown(), folder / "odometry");
-  odometry.push_back("--no-loops");
-  ASSERT_EQ(RunTutti(one).status, 0);
-  ASSERT_EQ(RunTutti(two).status, 0);
-  ASSERT_EQ(RunTutti(odometry).status, 0);
-  ExpectTheSameResults(folder / "one", folder / "two");
-  EXPECT_EQ(ReadAll(folder / "one" / "trajectory_odometry.txt"),
-            ReadAll(folder / "odometry" / "trajectory.txt"));
-}
-
-TEST(RunCommand, MaxFramesAndGroundTruthNone) {
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  auto arguments = Arguments(testing::TinyConfig(folder), testing::TinyTown(), out);
-  arguments.insert(arguments.end(), {"--end", "5", "--ground-truth", "none", "--quiet"});
-  Done(RunTutti(arguments));
-  const nlohmann::json s = Summary(out);
+TEST_F(RunCommand, MaxFramesAndGroundTruthNone) {
+  Done(Run("out", {"--end", "5", "--ground-truth", "none", "--quiet"}));
+  const nlohmann::json s = Summary();
   EXPECT_EQ(s["frames"]["total"], 5);
   EXPECT_FALSE(s.contains("evaluation"));
   EXPECT_FALSE(s["loops"].contains("true"));
 }
 
-TEST(RunCommand, TimingTableAndTraceChangeNoResult) {
-  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
-  auto measured = Arguments(config, testing::TinyTown(), folder / "measured");
-  measured.insert(measured.end(), {"--end", "10", "--timing", "--trace", folder / "t.json"});
-  auto plain = Arguments(config, testing::TinyTown(), folder / "plain");
-  plain.insert(plain.end(), {"--end", "10"});
-  const std::string run = Done(RunTutti(measured));
-  ASSERT_EQ(RunTutti(plain).status, 0);
-  EXPECT_EQ(ReadAll(folder / "measured" / "trajectory.txt"), ReadAll(folder / "plain" / "trajectory.txt"));
-  EXPECT_FALSE(Summary(folder / "plain")["timing"].contains("stages"));
+TEST_F(RunCommand, TimingTableAndTraceChangeNoResult) {
+  const std::string run = Done(Run("measured", {"--end", "10", "--timing", "--trace", folder_ / "t.json"}));
+  Done(Run("plain", {"--end", "10"}));
+  EXPECT_EQ(Poses("measured"), Poses("plain"));
+  EXPECT_FALSE(Summary("plain")["timing"].contains("stages"));
   EXPECT_THAT(run, HasSubstr("tracking      frame"));
-  EXPECT_EQ(Summary(folder / "measured")["timing"]["stages"][0]["lane"], "reading");
-  const auto trace = testing::ReadJson(folder / "t.json");
+  EXPECT_EQ(Summary("measured")["timing"]["stages"][0]["lane"], "reading");
+  const auto trace = testing::ReadJson(folder_ / "t.json");
   int frames = 0;
   for (const auto& event : trace["traceEvents"]) frames += event["name"] == "frame" ? 1 : 0;
   EXPECT_EQ(frames, 10);
 }
 
-TEST(RunCommand, UncalibratedImagesGiveLoopsOnlyAndSaySo) {
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  testing::WriteAll(folder / "images.yaml", "dataset: {type: images, sensor: mono}\n");
-  const std::string run =
-      Done(RunTutti(Arguments(folder / "images.yaml", testing::TinyTown() / "image_0", out)));
-  EXPECT_THAT(run, HasSubstr("appearance only"));
-  EXPECT_FALSE(fs::exists(out / "trajectory.txt"));
-  EXPECT_TRUE(fs::exists(out / "loops.csv"));
-  EXPECT_TRUE(Summary(out)["appearance_only"].get<bool>());
+TEST_F(RunCommand, UncalibratedImagesGiveLoopsOnlyAndSaySo) {
+  testing::WriteAll(folder_ / "images.yaml", "dataset: {type: images, sensor: mono}\n");
+  EXPECT_THAT(
+      Done(RunTutti(testing::RunArguments(folder_ / "images.yaml", testing::TinyTown() / "image_0", out_))),
+      HasSubstr("appearance only"));
+  EXPECT_FALSE(fs::exists(out_ / "trajectory.txt"));
+  EXPECT_TRUE(fs::exists(out_ / "loops.csv"));
+  EXPECT_TRUE(Summary()["appearance_only"].get<bool>());
 }
 
-TEST(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
-  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
-  const auto right = RunTutti({"calibrate-check", "--config", config, "--dataset", testing::TinyTown()});
-  EXPECT_EQ(right.status, 0) << right.output;
-  EXPECT_THAT(right.output, HasSubstr("nothing speaks against"));
+TEST_F(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
+  const std::vector<std::string> configured = {"calibrate-check", "--config", config_, "--dataset",
+                                               testing::TinyTown()};
   // What is found in the recording, where no file is given.
-  const std::string found = Done(RunTutti({"calibrate-check", testing::TinyTown()}));
-  EXPECT_THAT(found, HasSubstr("nothing speaks against"));
-  const fs::path swapped = testing::CopyOfTinyTown(folder / "swapped");
+  const std::vector<std::string> found = {"calibrate-check", testing::TinyTown()};
+  for (const std::vector<std::string>& words : {configured, found})
+    EXPECT_THAT(Done(RunTutti(words)), HasSubstr("nothing speaks against"));
+  const fs::path swapped = testing::CopyOfTinyTown(folder_ / "swapped");
   fs::rename(swapped / "image_0", swapped / "image");
   fs::rename(swapped / "image_1", swapped / "image_0");
   fs::rename(swapped / "image", swapped / "image_1");
-  ExpectRefusal(RunTutti({"calibrate-check", "--config", config, "--dataset", swapped}),
+  ExpectRefusal(RunTutti({"calibrate-check", "--config", config_, "--dataset", swapped}),
                 {"left and right are swapped"});
-  auto arguments = Arguments(config, swapped, folder / "out");
-  arguments.insert(arguments.end(), {"--end", "3"});
-  const std::string output = RunTutti(arguments).output;
-  EXPECT_THAT(output, HasSubstr("warning: the calibration can't be right"));
-  EXPECT_THAT(output, HasSubstr("    * the calibration can't be right"));
-  EXPECT_EQ(Summary(folder / "out")["calibration_findings"].size(), 1u);
+  const std::string output = RunTutti(testing::RunArguments(config_, swapped, out_, {"--end", "3"})).output;
+  EXPECT_THAT(output, AllOf(HasSubstr("warning: the calibration can't be right"),
+                            HasSubstr("    * the calibration can't be right")));
+  EXPECT_EQ(Summary()["calibration_findings"].size(), 1u);
 }
 
-TEST(RunCommand, AFollowedFolderGivesWhatACompleteOneGives) {
-  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
-  auto complete = Arguments(config, testing::TinyTown(), folder / "complete");
-  complete.insert(complete.end(), {"--end", "6", "--no-loops"});
-  auto followed = Arguments(config, testing::TinyTown(), folder / "followed");
-  followed.insert(followed.end(), {"--end", "6", "--no-loops", "--follow", "0.5"});
-  ASSERT_EQ(RunTutti(complete).status, 0);
-  Done(RunTutti(followed));
-  EXPECT_EQ(ReadAll(folder / "complete" / "trajectory.txt"), ReadAll(folder / "followed" / "trajectory.txt"));
+TEST_F(RunCommand, AFollowedFolderGivesWhatACompleteOneGives) {
+  Done(Run("complete", {"--end", "6", "--no-loops"}));
+  Done(Run("followed", {"--end", "6", "--no-loops", "--follow", "0.5"}));
+  EXPECT_EQ(Poses("complete"), Poses("followed"));
 }
 
-TEST(RunCommand, CtrlCWritesWhatThereIsAndSaysSo) {
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  const auto run = testing::RunTuttiAndSignal(
-      Arguments(testing::TinyConfig(folder), testing::TinyTown(), out), " 20%", SIGINT);
+TEST_F(RunCommand, CtrlCWritesWhatThereIsAndSaysSo) {
+  const auto run =
+      testing::RunTuttiAndSignal(testing::RunArguments(config_, testing::TinyTown(), out_), " 20%", SIGINT);
   EXPECT_EQ(run.status, 130) << run.output;
   EXPECT_THAT(run.output, HasSubstr("interrupted"));
-  const nlohmann::json s = Summary(out);
+  const nlohmann::json s = Summary();
   EXPECT_TRUE(s["interrupted"].get<bool>());
   EXPECT_LT(s["frames"]["total"].get<int>(), testing::kTinyFrames);
-  EXPECT_EQ(ReadTrajectory(out / "trajectory.txt", TrajectoryFormat::kTum).size(),
+  EXPECT_EQ(ReadTrajectory(out_ / "trajectory.txt", TrajectoryFormat::kTum).size(),
             s["frames"]["tracked"].get<std::size_t>());
 }
 
-TEST(RunCommand, HelpConfigAndVersion) {
+TEST_F(RunCommand, HelpConfigAndVersion) {
   EXPECT_THAT(RunTutti({"run", "--help-config"}).output, HasSubstr("loop_threshold"));
   EXPECT_THAT(RunTutti({"--version"}).output, StartsWith("tutti "));
 }
 
-TEST(RunCommand, RedKitchenBeginsWell) {
+TEST_F(RunCommand, RedKitchenBeginsWell) {
   TUTTI_REQUIRE_DATA(dataset, "redkitchen");
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  auto arguments = Arguments(testing::SourceDir() / "data" / "configs" / "7scenes.yaml", dataset, out);
-  arguments.insert(arguments.end(), {"--end", "60"});
-  Done(RunTutti(arguments));
-  const nlohmann::json s = Summary(out);
+  Done(RunTutti(testing::RunArguments(testing::SourceDir() / "data" / "configs" / "7scenes.yaml", dataset,
+                                      out_, {"--end", "60"})));
+  const nlohmann::json s = Summary();
   EXPECT_GE(s["frames"]["tracked"].get<int>(), 59);
   EXPECT_LT(s["evaluation"]["slam"]["ate_rmse_m"].get<double>(), 0.05);
 }

@@ -112,8 +112,8 @@ TEST_F(CameraPairRun, GoesWhereTheFolderOfThePairsGoes) {
 
 TEST_F(CameraPairRun, CountsTheFramesWithoutRightImage) {
   ASSERT_TRUE(WriteVideos(12));
-  const std::string run = Done(Run(Pair(), "out", {"--sensor", "stereo", "--calibration", Camchain()}));
-  EXPECT_THAT(run, HasSubstr("right.mkv ended after 12 images"));
+  EXPECT_THAT(Done(Run(Pair(), "out", {"--sensor", "stereo", "--calibration", Camchain()})),
+              HasSubstr("right.mkv ended after 12 images"));
   const nlohmann::json frames = Summary("out")["frames"];
   EXPECT_EQ(frames["total"], kTownPairs);
   EXPECT_EQ(frames["without_depth"], kTownPairs - 12);
@@ -168,8 +168,7 @@ TEST_F(VideoOfTheTown, IsRunWithTheTimesOfItsContainerAlsoThroughAPipe) {
   ExpectStampsOfTheVideo("file");
   const fs::path pipe = folder_ / "pipe";
   const testing::PipeSender sender(pipe, testing::ReadAll(video_));
-  const std::string of_pipe = Done(Run(pipe, "pipe_out"));
-  EXPECT_THAT(of_pipe, HasSubstr("a video through a pipe"));
+  EXPECT_THAT(Done(Run(pipe, "pipe_out")), HasSubstr("a video through a pipe"));
   ExpectStampsOfTheVideo("pipe_out");
 }
 

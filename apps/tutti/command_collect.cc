@@ -9,7 +9,6 @@
 #include "apps/report/page.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
-#include "apps/tutti/comparison_columns.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/options.h"
 #include "core/replaced_file.h"

@@ -8,11 +8,9 @@
 
 #include "apps/report/comparison_report.h"
 #include "apps/report/page.h"
-#include "apps/tutti/comparison_columns.h"
 #include "apps/tutti/files.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
-#include "tutti/core/significance.h"
 
 namespace tutti::cli {
 namespace {

@@ -1,4 +1,5 @@
-#include "apps/tutti/comparison_columns.h"
+// The columns of a table of runs, and their time per stage.
+#include "apps/tutti/comparison.h"
 
 #include <algorithm>
 #include <array>

@@ -1,16 +1,27 @@
+#include <sys/types.h>
+
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <sstream>
+#include <streambuf>
+#include <string>
 #include <system_error>
 #include <vector>
 
+#if defined(__GLIBC__) && defined(__GLIBCXX__)
+#define TUTTI_STDERR_CAN_BE_SET  // elsewhere stderr may not be assigned to
+#include <ext/stdio_sync_filebuf.h>
+#endif
+
 #include "apps/tutti/commands.h"
-#include "apps/tutti/foreign_lines.h"
 #include "apps/tutti/help.h"
 #include "apps/tutti/options.h"
 #include "core/terminal.h"
@@ -138,6 +149,104 @@ int Exit(const CLI::App& app, const CLI::ParseError& error) {
 int Fail(const std::string& text) {
   internal::Say("%s", text.c_str());
   return 1;
+}
+
+constexpr std::size_t kMostAlike = 5, kMostKinds = 100, kMostLine = 1000;
+
+std::string WithoutNumbers(const std::string& line) {
+  std::string out;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (std::isdigit(static_cast<unsigned char>(line[i])) == 0) {
+      out += line[i];
+      continue;
+    }
+    while (i + 1 < line.size() && (std::isxdigit(static_cast<unsigned char>(line[i + 1])) != 0 ||
+                                   line[i + 1] == 'x' || line[i + 1] == '.'))
+      ++i;
+    out += '#';
+  }
+  return out;
+}
+
+// What libraries print on stderr: five lines of a kind, and how many more there were.
+// While it lives, stderr and std::cerr are its own, so that readers of images and videos, which print a line
+// for each damaged one, don't fill the screen. Lines that differ in their numbers alone are of one kind.
+// tutti's own messages go to internal::StandardError().
+class ForeignLines {
+ public:
+  // `quiet`: nothing of it is printed.
+  explicit ForeignLines(bool quiet);
+  ~ForeignLines();
+  ForeignLines(const ForeignLines&) = delete;
+  ForeignLines& operator=(const ForeignLines&) = delete;
+
+ private:
+  struct Kind {
+    std::string first;
+    std::size_t count = 0;
+  };
+  void Take(const char* text, std::size_t size);
+  void EndLine();
+
+  bool quiet_;
+  std::FILE* before_ = nullptr;  // stderr
+  std::FILE* stream_ = nullptr;  // in its stead; null where the C library has none of its kind
+  std::unique_ptr<std::streambuf> buffer_;
+  std::streambuf* cerr_ = nullptr;  // std::cerr's own
+  std::mutex mutex_;
+  std::string line_;                   // that has not ended; guarded by mutex_, as all below
+  std::map<std::string, Kind> kinds_;  // by their text without numbers
+};
+
+ForeignLines::ForeignLines(bool quiet) : quiet_(quiet) {
+  internal::StandardError();  // what it was before
+#ifdef TUTTI_STDERR_CAN_BE_SET
+  cookie_io_functions_t functions = {};
+  functions.write = [](void* self, const char* text, std::size_t size) {
+    static_cast<ForeignLines*>(self)->Take(text, size);
+    return static_cast<ssize_t>(size);
+  };
+  stream_ = fopencookie(this, "w", functions);
+  if (stream_ == nullptr) return;
+  std::setvbuf(stream_, nullptr, _IONBF, 0);
+  before_ = stderr;
+  stderr = stream_;
+  buffer_ = std::make_unique<__gnu_cxx::stdio_sync_filebuf<char>>(stream_);
+  cerr_ = std::cerr.rdbuf(buffer_.get());
+#endif
+}
+
+ForeignLines::~ForeignLines() {
+  if (stream_ == nullptr) return;
+  std::cerr.rdbuf(cerr_);
+#ifdef TUTTI_STDERR_CAN_BE_SET
+  stderr = before_;
+#endif
+  std::fclose(stream_);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!line_.empty()) EndLine();
+  for (const auto& [kind, lines] : kinds_) {
+    if (lines.count > kMostAlike && !quiet_)
+      internal::Say("%zu more lines of a library like '%s'", lines.count - kMostAlike, lines.first.c_str());
+  }
+}
+
+void ForeignLines::Take(const char* text, std::size_t size) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (std::size_t i = 0; i < size; ++i) {
+    if (text[i] == '\n' || line_.size() >= kMostLine) EndLine();
+    if (text[i] != '\n') line_ += text[i];
+  }
+}
+
+void ForeignLines::EndLine() {
+  std::string kind = WithoutNumbers(line_);
+  if (kinds_.size() >= kMostKinds && kinds_.count(kind) == 0) kind = "...";
+  Kind& lines = kinds_[kind];
+  if (lines.count == 0) lines.first = line_;
+  if (++lines.count <= kMostAlike && !quiet_)
+    std::fprintf(internal::StandardError(), "%s\n", internal::Printable(line_).c_str());
+  line_.clear();
 }
 
 }  // namespace

@@ -1,9 +1,8 @@
-#include "apps/tutti/loops/loops_dump.h"
-
 #include <algorithm>
 #include <cerrno>
 
 #include "apps/tutti/files.h"
+#include "apps/tutti/loops/loops_output.h"
 #include "apps/tutti/text_table.h"
 
 namespace tutti::cli {

@@ -8,7 +8,6 @@
 
 #include "apps/tutti/files.h"
 #include "apps/tutti/loops/earlier_images.h"
-#include "apps/tutti/loops/loops_dump.h"
 #include "apps/tutti/text_table.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"

@@ -40,11 +40,9 @@ class CloseCommand : public ::testing::Test {
  protected:
   testing::ProcessResult Close(const fs::path& trajectory, const fs::path& images,
                                const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"close",         "--trajectory", trajectory,   "--images",
-                                          images,          "--config",     config_,      "--out",
-                                          folder_ / "out", "--quiet",      "--no-report"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunTutti(arguments);
+    return RunTutti({"close", "--trajectory", trajectory, "--images", images, "--config", config_, "--out",
+                     folder_ / "out", "--quiet", "--no-report"},
+                    more);
   }
   Trajectory Corrected() const {
     return ReadTrajectory(folder_ / "out" / "trajectory.txt", TrajectoryFormat::kTum);
@@ -259,11 +257,9 @@ class CloseImages : public ::testing::Test {
   }
   testing::ProcessResult Close(const fs::path& images, const fs::path& config, const std::string& out,
                                const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"close",       "--trajectory", odometry_, "--images",
-                                          images,        "--config",     config,    "--out",
-                                          folder_ / out, "--no-report"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return testing::RunTutti(arguments);
+    return testing::RunTutti({"close", "--trajectory", odometry_, "--images", images, "--config", config,
+                              "--out", folder_ / out, "--no-report"},
+                             more);
   }
   std::string Graph(const std::string& out) const { return Text(folder_ / out / "graph.g2o"); }
 

@@ -51,9 +51,7 @@ class CollectCommand : public ::testing::Test {
     WriteAll(folder / "summary.json", json.dump());
   }
   testing::ProcessResult Collect(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"collect", folder_ / "runs"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunTutti(arguments);
+    return RunTutti({"collect", folder_ / "runs"}, more);
   }
   const fs::path folder_ = testing::FreshFolder(), file_ = folder_ / "c.json";
 };

@@ -61,7 +61,8 @@ ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const
   return RunProgramAndSignal(TUTTI_EXECUTABLE, arguments, text, signal);
 }
 
-ProcessResult RunTutti(const std::vector<std::string>& arguments) {
+ProcessResult RunTutti(std::vector<std::string> arguments, const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
   return RunTuttiAndSignal(arguments, "", 0);
 }
 

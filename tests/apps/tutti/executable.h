@@ -22,8 +22,8 @@ ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
                                   const std::vector<std::string>& arguments, const std::string& text,
                                   int signal);
 
-/// Runs tutti with these arguments and waits for it.
-ProcessResult RunTutti(const std::vector<std::string>& arguments);
+/// Runs tutti with these arguments, and `more` at the end, and waits for it.
+ProcessResult RunTutti(std::vector<std::string> arguments, const std::vector<std::string>& more = {});
 
 /// `tutti run` with these, and `more` at the end.
 std::vector<std::string> RunArguments(const std::filesystem::path& config,

@@ -132,7 +132,7 @@ TEST_F(LoopsCommand, TheTableHoldsEveryRuleWithItsOwnFolder) {
     EXPECT_LE(test["mcnemar"]["p"].get<double>(), 1);
     EXPECT_LE(test["t_test"]["p"].get<double>(), 1);
   }
-  // The same bytes as a run of that rule alone.
+  // A run of that rule alone gives the same bytes.
   ASSERT_EQ(Run(truth, folder_ / "naive", {"--rule", "naive"}).status, 0);
   EXPECT_EQ(ReadAll(folder_ / "naive" / "hypotheses.csv"), ReadAll(out_ / "naive" / "hypotheses.csv"));
 }

@@ -39,9 +39,7 @@ class SessionsCommand : public ::testing::Test {
  protected:
   testing::ProcessResult Run(const fs::path& town, const fs::path& out,
                              const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {"run", "--dataset", town, "--out", out, "--quiet"};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunTutti(words);
+    return RunTutti({"run", "--dataset", town, "--out", out, "--quiet"}, more);
   }
   // Sessions in colours, a ring where this one was found in the map, and loops from one to the other.
   void ExpectItIsSeen(const fs::path& out) const {
@@ -168,9 +166,7 @@ SyntheticOptions TownToLocalizeIn(std::uint64_t seed) {
 class LocalizeCommand : public ::testing::Test {
  protected:
   testing::ProcessResult Localize(const fs::path& dataset, const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {"localize", "--map", map_, "--dataset", dataset, "--out", out_};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunTutti(words);
+    return RunTutti({"localize", "--map", map_, "--dataset", dataset, "--out", out_}, more);
   }
   static constexpr int kMapped = 175;  // of the frames: one lap
   const fs::path town_ = testing::GeneratedDataset(TownToLocalizeIn(1));

@@ -16,7 +16,6 @@
 #include "apps/run/runner.h"
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
-#include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
 
 namespace tutti {
@@ -31,11 +30,11 @@ using testing::ReadAll;
 using testing::RunTutti;
 using ::testing::StartsWith;
 
-class NothingLost : public ::testing::Test {
+class NothingLost : public testing::TownTest {
  protected:
   std::vector<std::string> Arguments(std::vector<std::string> more = {}) const {
     more.insert(more.begin(), "--no-report");
-    return testing::RunArguments(testing::TinyConfig(folder_), testing::TinyTown(), out_, more);
+    return testing::RunArguments(config_, testing::TinyTown(), out_, more);
   }
   testing::ProcessResult Run(const std::vector<std::string>& more = {}) const {
     return RunTutti(Arguments(more));
@@ -44,7 +43,7 @@ class NothingLost : public ::testing::Test {
   testing::ProcessResult RunAfter(const std::string& command, const std::vector<std::string>& more) const {
     return testing::RunInShell(command + " \"$@\"", Arguments(more));
   }
-  // Of the result, without what is hidden or grows.
+  // Files of the result, without what is hidden or grows.
   std::map<std::string, std::string> Files() const {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::directory_iterator(out_)) {
@@ -53,8 +52,6 @@ class NothingLost : public ::testing::Test {
     }
     return files;
   }
-
-  const fs::path folder_ = testing::FreshFolder(), out_ = folder_ / "out";
 };
 
 TEST_F(NothingLost, KilledARunLeavesTheEarlierResultAndItsPosesSoFar) {
@@ -173,8 +170,8 @@ TEST_F(NothingLost, ASecondRunOnOneFolderIsRefusedWithTheFirstOnesProcess) {
 
 TEST_F(NothingLost, ComparingIntoAForeignFolderIsRefused) {
   const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
-  const auto run = RunTutti(
-      {"compare", "--config", testing::TinyConfig(folder_), "--dataset", data, "--out", data, "--runs", "1"});
+  const auto run =
+      RunTutti({"compare", "--config", config_, "--dataset", data, "--out", data, "--runs", "1"});
   EXPECT_EQ(run.status, 1);
   EXPECT_THAT(run.output, AllOf(StartsWith("tutti: " + data.string()), HasSubstr("choose another --out")));
   EXPECT_FALSE(fs::exists(data / "odometry"));
@@ -197,11 +194,11 @@ TEST_F(NothingLost, LivePosesAreTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(ReadAll(out_ / "trajectory_online.txt"), one);
 }
 
-class FaultsWhileRunning : public ::testing::Test {
+class FaultsWhileRunning : public testing::TownTest {
  protected:
   std::vector<std::string> Arguments(const std::string& out,
                                      const std::vector<std::string>& more = {}) const {
-    return testing::RunArguments(testing::TinyConfig(folder_), town_, folder_ / out, more);
+    return testing::RunArguments(config_, town_, folder_ / out, more);
   }
   Trajectory Poses(const std::string& out) const {
     return ReadTrajectory(folder_ / out / "trajectory.txt", TrajectoryFormat::kTum);
@@ -214,7 +211,7 @@ class FaultsWhileRunning : public ::testing::Test {
     return testing::RunInShell(script, Arguments(out));
   }
 
-  const fs::path folder_ = testing::FreshFolder(), town_ = testing::CopyOfTinyTown(folder_ / "town");
+  const fs::path town_ = testing::CopyOfTinyTown(folder_ / "town");
 };
 
 TEST_F(FaultsWhileRunning, ADayBetweenTwoFramesIsSaidAndTheRunGoesOn) {

@@ -23,10 +23,8 @@ class OptimizeCommand : public ::testing::Test {
  protected:
   testing::ProcessResult Optimize(const std::string& graph, const std::vector<std::string>& more = {}) const {
     testing::WriteAll(folder_ / "in.g2o", graph);
-    std::vector<std::string> arguments = {"optimize",          folder_ / "in.g2o", "--out",
-                                          folder_ / "out.g2o", "--json",           folder_ / "out.json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return testing::RunTutti(arguments);
+    return testing::RunTutti(
+        {"optimize", folder_ / "in.g2o", "--out", folder_ / "out.g2o", "--json", folder_ / "out.json"}, more);
   }
   std::string Out() const { return testing::ReadAll(folder_ / "out.g2o"); }
   nlohmann::json Json() const { return testing::ReadJson(folder_ / "out.json"); }

@@ -11,7 +11,6 @@
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
-#include "tests/support/test_data.h"
 
 namespace tutti {
 namespace {
@@ -29,10 +28,10 @@ constexpr const char* kResults[] = {
     "trajectory.txt", "trajectory_odometry.txt", "trajectory_online.txt", "keyframes.txt", "loops.csv",
     "graph.g2o"};
 
-class Resume : public ::testing::Test {
+class Resume : public testing::TownTest {
  protected:
   std::vector<std::string> Arguments(const fs::path& out, const std::vector<std::string>& more) const {
-    return testing::RunArguments(testing::TinyConfig(folder_), testing::TinyTown(), out, more);
+    return testing::RunArguments(config_, testing::TinyTown(), out, more);
   }
   // Killed after so many seconds, unless it is at its end before.
   static testing::ProcessResult KilledAfter(double seconds, const std::vector<std::string>& arguments) {
@@ -41,7 +40,7 @@ class Resume : public ::testing::Test {
   static void ExpectTheSame(const fs::path& a, const fs::path& b) {
     for (const char* name : kResults) EXPECT_EQ(ReadAll(a / name) == ReadAll(b / name), true) << name;
   }
-  const fs::path folder_ = testing::FreshFolder(), out_ = folder_ / "out", whole_ = folder_ / "whole";
+  const fs::path whole_ = folder_ / "whole";
 };
 
 TEST_F(Resume, AfterThirtyKillsAtAnyMomentTheResultsAreTheSame) {

@@ -172,29 +172,30 @@ long LinesWith(const std::string& text, const std::string& with) {
   return count;
 }
 
-TEST(RunOptions, OnesThatCantBeAreRefusedBeforeTheImagesAreRead) {
-  const fs::path folder = testing::FreshFolder();
-  testing::WriteAll(folder / "file", "x");
-  fs::create_directories(folder / "foreign");
-  testing::WriteAll(folder / "foreign/letter.txt", "x");
+class RunOptions : public testing::TownTest {};
+
+TEST_F(RunOptions, OnesThatCantBeAreRefusedBeforeTheImagesAreRead) {
+  testing::WriteAll(folder_ / "file", "x");
+  fs::create_directories(folder_ / "foreign");
+  testing::WriteAll(folder_ / "foreign/letter.txt", "x");
   // A folder of images alone: its focal length would be measured first.
-  const std::string images = (testing::TinyTown() / "image_0").string(), out = (folder / "out").string();
+  const std::string images = (testing::TinyTown() / "image_0").string(), out = out_.string();
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
       {{"run", images, "--out", out, "--threads", "-1"}, "--threads: '-1' is not a number above 0"},
       {{"run", images, "--out", out, "--threads", "0"}, "--threads: '0'"},
       {{"run", images, "--out", out, "--view", "--view-port", "80000"}, "--view-port: '80000'"},
       {{"run", images, "--out", out, "--view", "--view-wait", "-3"}, "--view-wait: '-3'"},
-      {{"run", images, "--out", folder / "file"}, "file: is a file"},
-      {{"run", images, "--out", folder / "file/out"}, "out: the folder can't be made"},
-      {{"run", images, "--out", folder / "foreign"}, "holds letter.txt, which is no result"},
+      {{"run", images, "--out", folder_ / "file"}, "file: is a file"},
+      {{"run", images, "--out", folder_ / "file/out"}, "out: the folder can't be made"},
+      {{"run", images, "--out", folder_ / "foreign"}, "holds letter.txt, which is no result"},
       {{"run", images, "--out", out, "--require", "super"}, "--require: 'super' is unknown"},
-      {{"run", images, "--out", out, "--ground-truth", folder / "no.txt"}, "no.txt: can't be opened"},
-      {{"run", images, "--out", out, "--trace", folder / "no/trace.json"}, "trace.json"},
-      {{"run", images, "--out", out, "--save-map", folder / "no/map.tutti"}, "map.tutti"},
-      {{"loops", images, "--out", folder / "foreign"}, "holds letter.txt, which is no result"},
+      {{"run", images, "--out", out, "--ground-truth", folder_ / "no.txt"}, "no.txt: can't be opened"},
+      {{"run", images, "--out", out, "--trace", folder_ / "no/trace.json"}, "trace.json"},
+      {{"run", images, "--out", out, "--save-map", folder_ / "no/map.tutti"}, "map.tutti"},
+      {{"loops", images, "--out", folder_ / "foreign"}, "holds letter.txt, which is no result"},
       {{"loops", images, "--out", out, "--threads", "-1"}, "--threads: '-1'"},
-      {{"optimize", "in.g2o", "--out", folder / "no/x.g2o"}, "x.g2o: can't be written"},
-      {{"convert", "in.txt", folder / "foreign", "--to", "tum"}, "foreign: can't be written"}};
+      {{"optimize", "in.g2o", "--out", folder_ / "no/x.g2o"}, "x.g2o: can't be written"},
+      {{"convert", "in.txt", folder_ / "foreign", "--to", "tum"}, "foreign: can't be written"}};
   for (const auto& [arguments, said] : wrong) {
     const auto run = RunTutti(arguments);
     EXPECT_EQ(run.status, 1) << run.output;
@@ -205,7 +206,7 @@ TEST(RunOptions, OnesThatCantBeAreRefusedBeforeTheImagesAreRead) {
                 {"has 30 frames, 0 to 29; it can't start with frame 500"});
 }
 
-TEST(RunOptions, AnUnknownOptionNamesTheNearest) {
+TEST_F(RunOptions, AnUnknownOptionNamesTheNearest) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
       {{"run", "x", "--thread", "2"}, "no option '--thread' of tutti run; the nearest is '--threads'"},
       {{"loops", "x", "--treads=3"}, "no option '--treads' of tutti loops; the nearest is '--threads'"},
@@ -230,19 +231,18 @@ fs::path Photos(const fs::path& folder) {
   return folder;
 }
 
-TEST(RunOptions, AFailedRunHasExitStatusOneAndNamesTheCommandForPhotos) {
-  const fs::path folder = testing::FreshFolder(), photos = Photos(folder / "photos");
-  ExpectRefusal(RunTutti({"run", photos, "--out", folder / "out", "--fov", "60"}),
+TEST_F(RunOptions, AFailedRunHasExitStatusOneAndNamesTheCommandForPhotos) {
+  const fs::path photos = Photos(folder_ / "photos");
+  ExpectRefusal(RunTutti({"run", photos, "--out", out_, "--fov", "60"}),
                 {"failed:", "`tutti loops " + photos.string() + "` finds"});
 }
 
-TEST(RunOptions, TheBarOfTheExitStatusCanBeSet) {
-  const fs::path folder = testing::FreshFolder(), out = folder / "out";
-  const fs::path data = testing::CopyOfTinyTown(folder / "data");
+TEST_F(RunOptions, TheBarOfTheExitStatusCanBeSet) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
   for (int i = 10; i < 20; ++i)  // a third of the images: doubtful
     testing::WriteAll(data / "image_0" / ("0000" + std::to_string(i) + ".png"), "no image");
   const auto run = [&](const std::vector<std::string>& more) {
-    return RunTutti(testing::RunArguments(testing::TinyConfig(folder), data, out, more));
+    return RunTutti(testing::RunArguments(config_, data, out_, more));
   };
   const std::string usual = Done(run({}));
   EXPECT_THAT(usual, HasSubstr("33.3 % of the images are damaged"));
@@ -256,8 +256,8 @@ TEST(RunOptions, TheBarOfTheExitStatusCanBeSet) {
   EXPECT_EQ(run({"--require", "failed", "--quiet"}).status, 0);
 }
 
-TEST(RunOptions, QuietIsQuietAndLibrariesSayALineFiveTimes) {
-  const fs::path folder = testing::FreshFolder(), images = folder / "images";
+TEST_F(RunOptions, QuietIsQuietAndLibrariesSayALineFiveTimes) {
+  const fs::path images = folder_ / "images";
   fs::create_directories(images);
   for (int i = 0; i < 12; ++i) {  // bytes in the middle of a JPEG are wrong: its library prints a line
     std::vector<unsigned char> bytes;
@@ -266,7 +266,7 @@ TEST(RunOptions, QuietIsQuietAndLibrariesSayALineFiveTimes) {
     std::ofstream(images / (std::to_string(i) + ".jpg"), std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
-  const std::string out = (folder / "out").string();
+  const std::string out = out_.string();
   const auto loud = RunTutti({"run", images, "--fov", "60", "--out", out});
   EXPECT_EQ(LinesWith(loud.output, "Corrupt JPEG data"), 5 + 1) << loud.output;
   EXPECT_THAT(loud.output, HasSubstr(" more lines of a library like 'Corrupt JPEG data"));
@@ -277,15 +277,15 @@ TEST(RunOptions, QuietIsQuietAndLibrariesSayALineFiveTimes) {
   EXPECT_THAT(wrong.output, HasSubstr("--stride: '-1'")) << "an error is no note";
 }
 
-TEST(RunOptions, RepeatedTimeStampsAreNamedFiveTimesAndCountAgainstTheRun) {
-  const fs::path folder = testing::FreshFolder(), data = testing::CopyOfTinyTown(folder / "data");
+TEST_F(RunOptions, RepeatedTimeStampsAreNamedFiveTimesAndCountAgainstTheRun) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
   std::string times = "0\n";
   for (int i = 1; i < 30; ++i) times += i < 10 ? "0\n" : std::to_string(0.1 * i) + "\n";
   testing::WriteAll(data / "times.txt", times);
-  const auto run = RunTutti(testing::RunArguments(testing::TinyConfig(folder), data, folder / "out"));
+  const auto run = RunTutti(testing::RunArguments(config_, data, out_));
   EXPECT_EQ(LinesWith(run.output, "repeats the time stamp before it"), 5) << run.output;
   EXPECT_THAT(run.output, HasSubstr("4 more lines repeat the time stamp before them"));
-  const auto health = testing::ReadJson(folder / "out/summary.json")["health"];
+  const auto health = Summary()["health"];
   EXPECT_NE(health["word"], "good");
   EXPECT_NEAR(health["signs"]["damaged_images"].get<double>(), 9.0 / 30, 1e-9);
 }
@@ -300,14 +300,13 @@ void ScaleGroundTruth(const fs::path& data, double factor) {
   testing::WriteAll(data / "poses.txt", out.str());
 }
 
-TEST(RunOptions, AScaleThatTheGroundTruthContradictsIsNotGood) {
-  const fs::path folder = testing::FreshFolder();
+TEST_F(RunOptions, AScaleThatTheGroundTruthContradictsIsNotGood) {
   for (const auto& [factor, word] : {std::pair(5.0, "failed"), {1.2, "doubtful"}}) {
-    const fs::path data = testing::CopyOfTinyTown(folder / ("data" + std::to_string(factor)));
+    const fs::path data = testing::CopyOfTinyTown(folder_ / ("data" + std::to_string(factor)));
     ScaleGroundTruth(data, factor);
-    const auto run = RunTutti(testing::RunArguments(testing::TinyConfig(folder), data, folder / "out"));
+    const auto run = RunTutti(testing::RunArguments(config_, data, out_));
     EXPECT_THAT(run.output, HasSubstr("the ground truth says that the scale is off by a factor of"));
-    const auto summary = testing::ReadJson(folder / "out/summary.json");
+    const auto summary = Summary();
     EXPECT_EQ(summary["health"]["word"], word) << run.output;
     EXPECT_NEAR(summary["evaluation"]["sim3_scale"].get<double>(), factor, 0.05 * factor);
     EXPECT_EQ(run.status, word == std::string("failed") ? 1 : 0);

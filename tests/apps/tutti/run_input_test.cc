@@ -57,7 +57,7 @@ class CameraPairRun : public ::testing::Test {
     }
     return true;
   }
-  // As Kalibr writes it.
+  // The two cameras in a file of Kalibr.
   fs::path Camchain() const {
     DatasetOptions options;
     options.sensor = Sensor::kStereo;
@@ -79,10 +79,9 @@ class CameraPairRun : public ::testing::Test {
   }
   testing::ProcessResult Run(const std::string& dataset, const std::string& out,
                              const std::vector<std::string>& more) const {
-    std::vector<std::string> words{"run",         dataset,      "--out", folder_ / out,
-                                   "--no-report", "--no-loops", "--end", std::to_string(kTownPairs)};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunTutti(words);
+    return RunTutti({"run", dataset, "--out", folder_ / out, "--no-report", "--no-loops", "--end",
+                     std::to_string(kTownPairs)},
+                    more);
   }
   nlohmann::json Summary(const std::string& out) const {
     return testing::ReadJson(folder_ / out / "summary.json");
@@ -230,9 +229,7 @@ class ImageUse : public ::testing::Test {
   }
   testing::ProcessResult Run(const fs::path& town, const std::string& out,
                              const std::vector<std::string>& more) const {
-    std::vector<std::string> words{"run", town, "--out", folder_ / out, "--no-report"};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunTutti(words);
+    return RunTutti({"run", town, "--out", folder_ / out, "--no-report"}, more);
   }
   nlohmann::json Summary(const std::string& out) const {
     return testing::ReadJson(folder_ / out / "summary.json");

@@ -10,9 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "tests/apps/tiny_town.h"
 #include "tests/support/made_once.h"
-#include "tests/support/test_data.h"
 
 namespace tutti::testing {
 
@@ -92,16 +90,6 @@ std::string Done(const ProcessResult& run) {
 void ExpectRefusal(const ProcessResult& run, const std::vector<std::string>& words) {
   EXPECT_EQ(run.status, 1) << run.output;
   for (const std::string& word : words) EXPECT_THAT(run.output, ::testing::HasSubstr(word));
-}
-
-TownTest::TownTest() : folder_(FreshFolder()), out_(folder_ / "out"), config_(TinyConfig(folder_)) {}
-
-ProcessResult TownTest::Run(const std::string& out, const std::vector<std::string>& more) const {
-  return RunTutti(RunArguments(config_, TinyTown(), folder_ / out, more));
-}
-
-nlohmann::json TownTest::Summary(const std::string& out) const {
-  return ReadJson(folder_ / out / "summary.json");
 }
 
 ProcessResult RunInShell(const std::string& script, const std::vector<std::string>& arguments) {

@@ -1,7 +1,6 @@
 // Runs the real `tutti` executable, as a user would.
 #pragma once
 
-#include <gtest/gtest.h>
 #include <sys/types.h>
 
 #include <filesystem>
@@ -43,18 +42,6 @@ ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const
 std::string Done(const ProcessResult& run);
 /// Expects that it refused what it was told: status 1, and these words.
 void ExpectRefusal(const ProcessResult& run, const std::vector<std::string>& words);
-
-/// Runs on the tiny town, into folders of the test's own.
-class TownTest : public ::testing::Test {
- protected:
-  /// `tutti run` on the town, into a folder of this name.
-  ProcessResult Run(const std::string& out, const std::vector<std::string>& more = {}) const;
-  /// summary.json of that folder.
-  nlohmann::json Summary(const std::string& out = "out") const;
-
-  const std::filesystem::path folder_, out_, config_;
-  TownTest();
-};
 
 /// A script of the shell, in which "$@" is tutti with these arguments.
 ProcessResult RunInShell(const std::string& script, const std::vector<std::string>& arguments);

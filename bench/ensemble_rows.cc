@@ -15,7 +15,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/loops_input.h"
 #include "apps/tutti/loops/overlap_truth.h"
 #include "bench/ensemble_row.h"

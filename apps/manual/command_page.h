@@ -40,7 +40,4 @@ std::string ManPage(const CommandPage& program, const std::string& version);
 /// Completion of commands, options and fixed choices; else of files.
 std::string BashCompletion(const CommandPage& program);
 
-/// `text` with every `from` replaced.
-std::string Replaced(std::string text, const std::string& from, const std::string& to);
-
 }  // namespace tutti::manual

@@ -6,12 +6,11 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <fstream>
-#include <memory>
 #include <stdexcept>
 #include <string>
 
 #include "apps/manual/command_page.h"
+#include "core/replaced_file.h"
 
 namespace {
 
@@ -31,13 +30,6 @@ std::string Output(const std::string& command) {
   return out;
 }
 
-void Write(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw std::runtime_error(file.string() + ": can't be written");
-}
-
 void WriteManual(const std::string& tutti, const fs::path& folder) {
   const std::string call = "'" + tutti + "' ";
   CommandPage program = tutti::manual::ParsePage(Output(call + "--describe"));
@@ -50,8 +42,8 @@ void WriteManual(const std::string& tutti, const fs::path& folder) {
   std::string version = Output(call + "--version");
   version.erase(version.find_last_not_of('\n') + 1);
   fs::create_directories(folder);
-  Write(folder / "tutti.1", tutti::manual::ManPage(program, version));
-  Write(folder / "tutti", tutti::manual::BashCompletion(program));
+  tutti::internal::WriteFile(folder / "tutti.1", tutti::manual::ManPage(program, version));
+  tutti::internal::WriteFile(folder / "tutti", tutti::manual::BashCompletion(program));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 
 #include "apps/run/map_figures.h"
 #include "apps/run/run_parts.h"
-#include "frontend/dataset/turned_dataset.h"
+#include "frontend/dataset/wrapped_dataset.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {

@@ -3,11 +3,9 @@
 #include <memory>
 #include <string>
 
-#include "apps/tutti/camera_options.h"
 #include "apps/tutti/commands.h"
-#include "apps/tutti/configuration_of.h"
+#include "apps/tutti/recording_options.h"
 #include "core/terminal.h"
-#include "tutti/core/error.h"
 #include "tutti/frontend/calibration_check.h"
 #include "tutti/slam/config.h"
 
@@ -16,12 +14,11 @@ namespace {
 
 struct CheckArguments {
   std::string config, dataset;
-  CameraWords camera;
+  CameraRequest camera;
 };
 
-int Check(const CLI::App& command, const CheckArguments& arguments) {
-  const RunConfig config =
-      ConfigurationOf(arguments.config, arguments.dataset, CameraOf(command, arguments.camera));
+int Check(const CheckArguments& arguments) {
+  const RunConfig config = ConfigurationOf(arguments.config, arguments.dataset, arguments.camera);
   const std::unique_ptr<Dataset> dataset = OpenDataset(arguments.dataset, config.dataset);
   const CameraRig& rig = dataset->Rig();
   for (const std::string& warning : dataset->Warnings())
@@ -65,7 +62,7 @@ void SetUpCalibrateCheck(CLI::App& command, int& exit_code) {
   command.add_option("--config", arguments->config,
                      "YAML file, as for `tutti run`; without it, what is found in the recording is checked");
   AddCameraOptions(command, arguments->camera);
-  command.callback([&command, arguments, &exit_code] { exit_code = Check(command, *arguments); });
+  command.callback([arguments, &exit_code] { exit_code = Check(*arguments); });
 }
 
 }  // namespace tutti::cli

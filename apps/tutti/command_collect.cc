@@ -7,12 +7,10 @@
 #include <vector>
 
 #include "apps/report/page.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
-#include "apps/tutti/comparison_columns.h"
-#include "apps/tutti/comparison_page.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/options.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
@@ -25,7 +23,8 @@ namespace fs = std::filesystem;
 
 struct CollectArguments {
   std::vector<std::string> runs;
-  std::string table_format = "text", json, report;
+  TableFormat format = TableFormat::kText;
+  std::string json, report;
   bool by_folder = false;
   TableChoice choice;
 };
@@ -55,25 +54,24 @@ std::string FolderAbove(const fs::path& summary) {
 }
 
 void RunCollect(const CollectArguments& arguments) {
-  const TableFormat format = ParseTableFormat(arguments.table_format);
-  RequireWritable({arguments.json, arguments.report});
-  Comparison comparison;
+  CheckFiles({}, {arguments.json, arguments.report});
+  std::vector<RunFigures> runs;
   std::vector<std::string> read;
   for (const std::string& where : arguments.runs) {
     for (const fs::path& file : Summaries(where)) {
       read.push_back(file);
-      comparison.runs.push_back(ReadRunFigures(file));
-      if (arguments.by_folder) comparison.runs.back().variant = FolderAbove(file);
+      runs.push_back(ReadRunFigures(file));
+      if (arguments.by_folder) runs.back().variant = FolderAbove(file);
     }
   }
   KeepInputs(read, {arguments.json, arguments.report});
-  const std::string tables = DescribeComparison(comparison, format, arguments.choice);
+  const std::string tables = DescribeComparison(runs, arguments.format, arguments.choice);
   std::fputs(internal::Printable(tables, internal::Breaks::kAll).c_str(), stdout);
   if (!arguments.report.empty()) {
     if (!ReportsAvailable()) throw InputError("--report: " + ReportsMissing());
-    WriteComparisonReport(arguments.report, "tutti collect", comparison);
+    WriteComparisonReport(arguments.report, "tutti collect", runs);
   }
-  if (!arguments.json.empty()) internal::WriteFile(arguments.json, JsonText(ComparisonJson(comparison)));
+  if (!arguments.json.empty()) internal::WriteFile(arguments.json, JsonText(ComparisonJson(runs)));
 }
 
 }  // namespace
@@ -85,14 +83,14 @@ void SetUpCollect(CLI::App& command, int&) {
       ->required();
   command.add_flag("--by-folder", arguments->by_folder,
                    "a run's variant is the name of the folder above its own (CONFIGURATION/start_0)");
-  AddTableFormatOption(command, arguments->table_format);
+  AddTableFormatOption(command, arguments->format);
   command
       .add_option("--columns", arguments->choice.columns,
                   "Which columns, in this order: " + JoinText(ComparisonColumns()) + "; all if none is given")
       ->delimiter(',')
       ->check(OneOf(ComparisonColumns()));
-  command.add_option("--precision", arguments->choice.decimals, "Decimals of the errors")
-      ->check(NumberThat([](double value) { return value >= 0 && value <= 12; }, "of 0 to 12", "0..12"));
+  AddOption(command, "--precision", arguments->choice.decimals, "Decimals of the errors",
+            NumberThat([](double value) { return value >= 0 && value <= 12; }, "of 0 to 12", "0..12"));
   command.add_flag("--bold-best", arguments->choice.bold_best,
                    "The best of each column in bold (markdown, latex) or with a star (text)");
   command.add_option("--json", arguments->json, "Write the table to this file");
@@ -101,15 +99,12 @@ void SetUpCollect(CLI::App& command, int&) {
       "Write one page over all runs to this file (report.html); charts are of the first run of "
       "each data set and variant");
   command.footer(
-      "Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: "
-      "joint),\n"
-      "standardised-mean (that preset), else the rule. Runs of one group should differ in the first frame, "
-      "the "
-      "noise or\n"
-      "the seed alone: the table says in which, and the interval is over them.\n"
-      "Examples:\n"
-      "  tutti collect results/ --table-format markdown > table.md\n"
-      "  tutti collect results/ --columns ate,rpe,time --precision 3 --bold-best --table-format latex");
+      R"(Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: joint),
+standardised-mean (that preset), else the rule. Runs of one group should differ in the first frame, the noise or
+the seed alone: the table says in which, and the interval is over them.
+Examples:
+  tutti collect results/ --table-format markdown > table.md
+  tutti collect results/ --columns ate,rpe,time --precision 3 --bold-best --table-format latex)");
   command.callback([arguments] { RunCollect(*arguments); });
 }
 

@@ -1,8 +1,14 @@
 // tutti compare: what did the ensemble buy me? The same SLAM with each way to find loops.
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
-#include <cstdint>
+#include <cerrno>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -11,17 +17,11 @@
 #include "apps/report/page.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/output_folder.h"
-#include "apps/run/runner.h"
-#include "apps/tutti/camera_options.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
-#include "apps/tutti/comparison_page.h"
-#include "apps/tutti/configuration_of.h"
 #include "apps/tutti/files.h"
-#include "apps/tutti/run_apart.h"
+#include "apps/tutti/recording_options.h"
 #include "apps/tutti/run_with_report.h"
-#include "core/example_configs.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
@@ -34,15 +34,69 @@ namespace {
 namespace fs = std::filesystem;
 
 struct CompareArguments {
-  std::string config, out, ground_truth, table_format = "text";
+  RunRequest request;  // what the options say of each run
+  std::string config, out;
+  TableFormat format = TableFormat::kText;
   std::vector<std::string> datasets;
   std::vector<std::string> variants = {"odometry", "surf",     "sift", "orb",      "naive",
                                        "product",  "majority", "mean", "log-pool", "standardised-mean",
                                        "ensemble"};
-  int runs = 5, start = 0, end = 0, stride = 1, threads = 2;
+  int runs = 5, start = 0;
   double noise = 0;
   bool separate = false;
-  CameraWords camera;
+  CameraRequest camera;
+};
+
+// Calls `work` in a copy of this process, where memory is measured for itself and a crash ends that one
+// alone. Returns its status; 128 + signal if it was killed, 2 if it threw (the text goes to stderr). Only one
+// thread may run. Throws InputError if no process can be started.
+int RunApart(const std::function<int()>& work) {
+  std::fflush(nullptr);
+  const pid_t child = fork();
+  if (child < 0) throw InputError("no new process can be started; is the machine out of memory?");
+  if (child == 0) {
+    int status = 2;
+    try {
+      status = work();
+    } catch (const std::exception& error) {
+      internal::Say("%s", error.what());
+    }
+    std::fflush(nullptr);
+    _exit(status);
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+// Statuses that a process leaves for the one that started it, however it ends.
+class SharedStatuses {
+ public:
+  // Throws InputError if there is no memory.
+  explicit SharedStatuses(std::size_t count) : count_(count) {
+    void* memory =
+        mmap(nullptr, count * sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) throw InputError("the machine is out of memory");
+    statuses_ = static_cast<int*>(memory);
+    std::fill_n(statuses_, count_, kNever);
+  }
+  ~SharedStatuses() { munmap(statuses_, count_ * sizeof(int)); }
+  SharedStatuses(const SharedStatuses&) = delete;
+  SharedStatuses& operator=(const SharedStatuses&) = delete;
+
+  void Set(std::size_t i, int status) { statuses_[i] = status; }
+  // All; those that were never set get `otherwise`, or 2 if that is 0.
+  std::vector<int> Take(int otherwise) const {
+    std::vector<int> out(statuses_, statuses_ + count_);
+    std::replace(out.begin(), out.end(), int{kNever}, otherwise == 0 ? 2 : otherwise);
+    return out;
+  }
+
+ private:
+  static constexpr int kNever = -1;
+  std::size_t count_;
+  int* statuses_;
 };
 
 // The configuration of a variant. Throws InputError for a word that is none.
@@ -79,31 +133,11 @@ std::vector<Sample> Samples(const CompareArguments& arguments) {
   return samples;
 }
 
-RunRequest Request(const CLI::App& command, const CompareArguments& arguments, const fs::path& out,
-                   const Sample& sample) {
-  RunRequest request;
-  request.config = arguments.config;
-  request.dataset = sample.dataset;
-  request.out = out;
-  request.start = sample.start;
-  request.quiet = true;
-  if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
-  if (command.count("--threads") > 0) request.threads = arguments.threads;
-  if (command.count("--end") > 0) request.end = arguments.end;
-  if (command.count("--stride") > 0) request.stride = arguments.stride;
-  return request;
-}
-
-void CheckVariants(const CompareArguments& arguments) {
-  const std::set<std::string> different(arguments.variants.begin(), arguments.variants.end());
-  if (different.size() != arguments.variants.size()) throw InputError("--variants: one is named twice");
-}
-
 /// The experiment: its folders, and a process for each part of it.
 class Experiment {
  public:
-  Experiment(const CLI::App& command, const CompareArguments& arguments, const RunConfig& config)
-      : command_(command), arguments_(arguments), config_(config), samples_(Samples(arguments)) {
+  Experiment(const CompareArguments& arguments, const RunConfig& config)
+      : arguments_(arguments), config_(config), samples_(Samples(arguments)) {
     const bool odometry_too =
         std::count(arguments.variants.begin(), arguments.variants.end(), "odometry") > 0;
     for (const std::string& variant : arguments.variants)
@@ -143,7 +177,13 @@ class Experiment {
 
   RunRequest RequestFor(const std::string& variant, std::size_t k) const {
     MakeFolder(Folder(variant, k).parent_path());
-    return Request(command_, arguments_, Folder(variant, k), samples_[k]);
+    RunRequest request = arguments_.request;
+    request.config = arguments_.config;
+    request.dataset = samples_[k].dataset;
+    request.out = Folder(variant, k);
+    request.start = samples_[k].start;
+    request.quiet = true;
+    return request;
   }
 
   // The noise is no option of `tutti run`, so it comes with the configuration.
@@ -157,9 +197,8 @@ class Experiment {
     std::vector<int> statuses;
     for (std::size_t v = 0; v < configs_.size(); ++v) {
       Say(arguments_.variants[v], k);
-      const RunRequest request = RequestFor(arguments_.variants[v], k);
-      statuses.push_back(
-          RunApart([&] { return StatusOf(RunWithReport(request, WithNoise(configs_[v], k))); }));
+      const RunRequest request = WithReport(RequestFor(arguments_.variants[v], k));
+      statuses.push_back(RunApart([&] { return StatusOf(RunSlam(request, WithNoise(configs_[v], k))); }));
       if (statuses.back() == 130) break;
     }
     return statuses;
@@ -170,7 +209,8 @@ class Experiment {
     SharedStatuses statuses(configs_.size());
     const int tracking = RunApart([&] {
       Say("odometry", k);
-      const TrackedSequence tracked = TrackWithReport(RequestFor("odometry", k), WithNoise(config_, k));
+      const TrackedSequence tracked =
+          TrackSequence(WithReport(RequestFor("odometry", k), false), WithNoise(config_, k));
       const int status = StatusOf(tracked.result);
       for (std::size_t v = 0; v < configs_.size() && status == 0; ++v) {
         if (arguments_.variants[v] == "odometry") {
@@ -178,11 +218,11 @@ class Experiment {
           continue;
         }
         Say(arguments_.variants[v], k);
-        const RunRequest request = RequestFor(arguments_.variants[v], k);
+        const RunRequest request = WithReport(RequestFor(arguments_.variants[v], k));
         const RunConfig config = WithNoise(configs_[v], k);
         statuses.Set(v, RunApart([&] {
-                       return StatusOf(tracked.odometry ? CloseLoopsWithReport(tracked, request, config)
-                                                        : RunWithReport(request, config));
+                       return StatusOf(tracked.odometry ? CloseLoops(tracked, request, config)
+                                                        : RunSlam(request, config));
                      }));
         if (InterruptGuard::Requested()) return 130;
       }
@@ -191,7 +231,6 @@ class Experiment {
     return statuses.Take(tracking);
   }
 
-  const CLI::App& command_;
   const CompareArguments& arguments_;
   RunConfig config_;
   std::vector<Sample> samples_;
@@ -208,37 +247,36 @@ OutputLayout Layout() {
   return {is_result, "comparison.json", "datasets", {}, is_part};
 }
 
-void WriteComparison(OutputFolder& folder, const Comparison& comparison) {
-  folder.Write({"comparison.md", [&](const fs::path& file) {
-                  internal::WriteFile(file, DescribeComparison(comparison, TableFormat::kMarkdown));
+void WriteComparison(OutputFolder& folder, const std::vector<RunFigures>& runs) {
+  using File = const fs::path&;
+  folder.Write({"comparison.md", [&](File file) {
+                  internal::WriteFile(file, DescribeComparison(runs, TableFormat::kMarkdown));
                 }});
-  folder.Write({"comparison.json", [&](const fs::path& file) {
-                  internal::WriteFile(file, JsonText(ComparisonJson(comparison)));
-                }});
+  folder.Write(
+      {"comparison.json", [&](File file) { internal::WriteFile(file, JsonText(ComparisonJson(runs))); }});
   if (ReportsAvailable()) {
-    folder.Write({"report.html", [&](const fs::path& file) {
-                    WriteComparisonReport(file, "tutti compare: " + comparison.runs.front().dataset,
-                                          comparison);
+    folder.Write({"report.html", [&](File file) {
+                    WriteComparisonReport(file, "tutti compare: " + runs.front().dataset, runs);
                   }});
   }
   const fs::path where = folder.Finish(true);
   ThrowFailures(folder.failures(), where);
 }
 
-int RunCompare(const CLI::App& command, CompareArguments arguments) {
+int RunCompare(CompareArguments arguments) {
   if (arguments.out.empty()) arguments.out = DefaultOutput(arguments.datasets.front(), "-compared");
-  const TableFormat format = ParseTableFormat(arguments.table_format);
-  CheckVariants(arguments);
+  if (std::set<std::string>(arguments.variants.begin(), arguments.variants.end()).size() !=
+      arguments.variants.size())
+    throw InputError("--variants: one is named twice");
   OutputFolder::Check(arguments.out, Layout());
-  const RunConfig config =
-      ConfigurationOf(arguments.config, arguments.datasets.front(), CameraOf(command, arguments.camera));
+  const RunConfig config = ConfigurationOf(arguments.config, arguments.datasets.front(), arguments.camera);
   for (const std::string& dataset : arguments.datasets) {
     if (IsPipe(dataset)) DetectDatasetType(dataset);  // says that it comes once
   }
-  const Experiment experiment(command, arguments, config);
+  const Experiment experiment(arguments, config);
   DatasetOptions last = config.dataset;
   last.start = arguments.start + arguments.runs - 1;
-  if (command.count("--end") > 0) last.end = arguments.end;
+  if (arguments.request.end) last.end = *arguments.request.end;
   for (const std::string& dataset : arguments.datasets)
     OpenDataset(dataset, last);  // what no variant can read is said once
   const InterruptGuard guard;
@@ -252,18 +290,18 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
       return 130;
     }
   }
-  Comparison comparison;
+  std::vector<RunFigures> runs;
   for (std::size_t v = 0; v < arguments.variants.size(); ++v) {
     for (std::size_t k = 0; k < experiment.Runs(); ++k)
-      comparison.runs.push_back(experiment.Figures(v, k, statuses[k][v]));
+      runs.push_back(experiment.Figures(v, k, statuses[k][v]));
   }
-  const std::string tables = DescribeComparison(comparison, format);
+  const std::string tables = DescribeComparison(runs, arguments.format);
   std::fputs(internal::Printable(tables, internal::Breaks::kAll).c_str(), stdout);
-  WriteComparison(folder, comparison);
+  WriteComparison(folder, runs);
   if (ReportsAvailable()) std::printf("\n%s\n", (folder.path() / "report.html").c_str());
   if (!ReportsAvailable()) internal::Say("%s", ReportsMissing().c_str());
   const auto failed = [](const RunFigures& run) { return !run.failure.empty(); };
-  return std::any_of(comparison.runs.begin(), comparison.runs.end(), failed) ? 1 : 0;
+  return std::any_of(runs.begin(), runs.end(), failed) ? 1 : 0;
 }
 
 }  // namespace
@@ -281,45 +319,34 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
   command.add_option("--out", arguments->out,
                      "folder for all runs and for comparison.md, comparison.json and report.html (default: "
                      "tutti-out/NAME-compared)");
-  command
-      .add_option("--variants", arguments->variants,
-                  "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority, "
-                  "mean, log-pool: that rule; standardised-mean: that preset; ensemble: the rule joint")
-      ->delimiter(',')
-      ->capture_default_str();
-  command
-      .add_option(
-          "--runs", arguments->runs,
-          "runs of each variant on each data set: each starts a frame later than the one before, and gets "
-          "noise of its own (--noise). Below five there is no p")
-      ->check(Positive())
-      ->capture_default_str();
-  command
-      .add_option("--noise", arguments->noise,
-                  "standard deviation of Gaussian noise that is added to the images [grey levels of 255]")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command.add_option("--ground-truth", arguments->ground_truth,
-                     "trajectory to evaluate against (default: the data set's own)");
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
-      ->check(Positive());
-  command.add_option("--start", arguments->start, "first frame of the first run, counted from 0")
-      ->check(NotNegative());
-  command.add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
-  command.add_option("--stride", arguments->stride, "use every so many frames")->check(Positive());
+  AddDefaulted(command, "--variants", arguments->variants,
+               "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority, mean, "
+               "log-pool: that rule; standardised-mean: that preset; ensemble: the rule joint")
+      ->delimiter(',');
+  AddDefaulted(
+      command, "--runs", arguments->runs,
+      "runs of each variant on each data set: each starts a frame later than the one before, and gets "
+      "noise of its own (--noise). Below five there is no p",
+      Positive());
+  AddDefaulted(command, "--noise", arguments->noise,
+               "standard deviation of Gaussian noise that is added to the images [grey levels of 255]",
+               NotNegative());
+  RunRequest& request = arguments->request;
+  AddPath(command, "--ground-truth", request.ground_truth,
+          "trajectory to evaluate against (default: the data set's own)");
+  AddThreads(command, request.threads);
+  AddOption(command, "--start", arguments->start, "first frame of the first run, counted from 0",
+            NotNegative());
+  AddEndAndStride(command, "frame", request.end, request.stride);
   command.add_flag("--separate", arguments->separate,
                    "no shared odometry: every variant tracks, too, as `tutti run` does");
-  AddTableFormatOption(command, arguments->table_format);
+  AddTableFormatOption(command, arguments->format);
   command.footer(
-      "Each run has its folder OUT/VARIANT/run_N with everything that `tutti run` writes. Tracking is done "
-      "once "
-      "for each N\n"
-      "(OUT/odometry/run_N), and every variant closes its loops on that odometry; with --separate each is a "
-      "run "
-      "of its own,\n"
-      "whose loops move the map that it tracks on. A run that fails is reported, and the rest go on.\n"
-      "Example: tutti compare redkitchen --config 7scenes --variants odometry,orb,ensemble");
-  command.callback([&command, arguments, &exit_code] { exit_code = RunCompare(command, *arguments); });
+      R"(Each run has its folder OUT/VARIANT/run_N with everything that `tutti run` writes. Tracking is done once for each N
+(OUT/odometry/run_N), and every variant closes its loops on that odometry; with --separate each is a run of its own,
+whose loops move the map that it tracks on. A run that fails is reported, and the rest go on.
+Example: tutti compare redkitchen --config 7scenes --variants odometry,orb,ensemble)");
+  command.callback([arguments, &exit_code] { exit_code = RunCompare(*arguments); });
 }
 
 }  // namespace tutti::cli

@@ -51,8 +51,7 @@ std::vector<double> Recalls(const CompareLoopsArguments& arguments, const std::v
 }
 
 int CompareLoops(const CompareLoopsArguments& arguments) {
-  KeepInputs(arguments.tables, {arguments.out});
-  RequireWritable({arguments.out});
+  CheckFiles(arguments.tables, {arguments.out});
   std::vector<Json> tables;
   for (const std::string& file : arguments.tables) tables.push_back(ReadTable(file));
   Json tests = Json::array();

@@ -7,6 +7,7 @@
 
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/options.h"
 #include "core/terminal.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
@@ -22,14 +23,13 @@ void RunConvert(const ConvertArguments& arguments) {
   std::optional<PoseFileFormat> from;
   if (arguments.from != "auto") from = ParsePoseFileFormat(arguments.from);
   const PoseFileFormat to = ParsePoseFileFormat(arguments.to);
-  KeepInputs({arguments.in, arguments.times}, {arguments.out, arguments.times_out});
-  RequireWritable({arguments.out, arguments.times_out});
+  CheckFiles({arguments.in, arguments.times}, {arguments.out, arguments.times_out});
   std::vector<double> times;
   std::vector<std::string> warnings;
   if (!arguments.times.empty()) times = ReadTimes(arguments.times, &warnings);
   const PoseFile in = ReadPoseFile(arguments.in, from, times);
-  warnings.insert(warnings.end(), in.warnings.begin(), in.warnings.end());
-  for (const std::string& warning : warnings) internal::Say("warning: %s", warning.c_str());
+  SayWarnings(warnings);
+  SayWarnings(in.warnings);
   const bool needs_stamps = to == PoseFileFormat::kTum || to == PoseFileFormat::kEuroc;
   if (!in.has_stamps && (needs_stamps || !arguments.times_out.empty())) {
     throw InputError(arguments.in + ": the format " + ToString(in.format) +
@@ -55,26 +55,20 @@ void SetUpConvert(CLI::App& command, int&) {
   command.add_option("--to", arguments->to, "Format of the output")
       ->required()
       ->check(CLI::IsMember(PoseFileFormatNames()));
-  command.add_option("--from", arguments->from, "Format of the input; auto: by content")
-      ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}))
-      ->capture_default_str();
+  AddDefaulted(command, "--from", arguments->from, "Format of the input; auto: by content",
+               CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}));
   command.add_option("--times", arguments->times,
                      "Time stamps of kitti's lines or g2o's ids: one a line, as KITTI's times.txt");
   command.add_option("--times-out", arguments->times_out, "Write the time stamps to this file");
   command.footer(
-      "Nothing is turned or moved: KITTI's ground truth stays in its camera frame, EuRoC's in the body's. "
-      "g2o "
-      "gets the\n"
-      "vertices 0, 1, ... and edges between neighbours with identity information, for viewers and tests, not "
-      "to optimise.\n"
-      "Time stamps are kept to the nanosecond. Their unit (s, ms, us, ns) is recognised by size and spacing, "
-      "and "
-      "said\n"
-      "where it is not the format's. Columns that a first line names may be in any order.\n"
-      "Examples:\n"
-      "  tutti convert poses/00.txt 00.tum --to tum --times sequences/00/times.txt\n"
-      "  tutti convert mav0/state_groundtruth_estimate0/data.csv groundtruth.txt --to tum\n"
-      "  tutti convert out/trajectory.txt 00.txt --to kitti --times-out times.txt");
+      R"(Nothing is turned or moved: KITTI's ground truth stays in its camera frame, EuRoC's in the body's. g2o gets the
+vertices 0, 1, ... and edges between neighbours with identity information, for viewers and tests, not to optimise.
+Time stamps are kept to the nanosecond. Their unit (s, ms, us, ns) is recognised by size and spacing, and said
+where it is not the format's. Columns that a first line names may be in any order.
+Examples:
+  tutti convert poses/00.txt 00.tum --to tum --times sequences/00/times.txt
+  tutti convert mav0/state_groundtruth_estimate0/data.csv groundtruth.txt --to tum
+  tutti convert out/trajectory.txt 00.txt --to kitti --times-out times.txt)");
   command.callback([arguments] { RunConvert(*arguments); });
 }
 

@@ -9,14 +9,11 @@
 
 #include "apps/report/page.h"
 #include "apps/run/interrupt.h"
-#include "apps/run/outputs.h"
 #include "apps/run/progress.h"
-#include "apps/run/runner.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/run_with_report.h"
 #include "core/terminal.h"
 #include "data/synthetic/synthetic_world.h"
-#include "tutti/core/error.h"
 
 namespace tutti::cli {
 namespace {
@@ -75,14 +72,12 @@ int Demo(const fs::path& out) {
   request.config = "tutti demo";
   request.dataset = data;
   request.out = out / "run";
-  const RunResult result = RunWithReport(request, DemoConfig());
-  std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
+  const RunResult result = RunAndPrint(request, DemoConfig());
   std::printf("\n  plot:       %s and .svg\n", (result.folder / "trajectory.png").c_str());
   if (ReportsAvailable()) std::printf("  report:     %s\n", (result.folder / "report.html").c_str());
   std::printf("  results:    %s\n", (result.folder / "summary.json").c_str());
   std::printf("  the images: %s (KITTI layout)\n", data.c_str());
-  if (result.interrupted) return 130;
-  return result.Void() ? 1 : 0;
+  return StatusOf(result);
 }
 
 }  // namespace

@@ -6,13 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "apps/tutti/against.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/evaluation_input.h"
 #include "apps/tutti/evaluation_output.h"
 #include "apps/tutti/files.h"
-#include "apps/tutti/published.h"
+#include "apps/tutti/options.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 
@@ -23,7 +21,8 @@ constexpr int kLimitNotMet = 3;  // 1 is bad input, 2 an internal error
 
 struct EvaluateArguments {
   EvaluationInput input;
-  std::string json, errors, table_format = "text";
+  std::string json, errors;
+  TableFormat format = TableFormat::kText;
   Against against;
   double max_ate_m = std::numeric_limits<double>::infinity();
   double min_coverage = 0;
@@ -45,7 +44,7 @@ bool MeetsLimits(const EvaluatedEstimate& estimate, const EvaluateArguments& arg
 }
 
 int RunEvaluate(const EvaluateArguments& arguments) {
-  const TableFormat format = ParseTableFormat(arguments.table_format);
+  const TableFormat format = arguments.format;
   const EvaluationInput input = Resolved(arguments.input);
   const bool against = !arguments.against.benchmark.empty();
   if (against && input.reference.empty() && input.estimates.empty()) {
@@ -53,8 +52,7 @@ int RunEvaluate(const EvaluateArguments& arguments) {
     return 0;
   }
   RequireFiles(input);
-  KeepInputs(FilesOf(input), {arguments.json, arguments.errors});
-  RequireWritable({arguments.json, arguments.errors});
+  CheckFiles(FilesOf(input), {arguments.json, arguments.errors});
   std::optional<PublishedComparison> published;
   if (against) published.emplace(arguments.against, input);
   const std::vector<EvaluatedEstimate> estimates = EvaluateInput(input);
@@ -78,48 +76,38 @@ int RunEvaluate(const EvaluateArguments& arguments) {
 void SetUpEvaluate(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<EvaluateArguments>();
   AddEvaluationOptions(command, arguments->input);
-  AddTableFormatOption(command, arguments->table_format);
+  AddTableFormatOption(command, arguments->format);
   command.add_option("--json", arguments->json, "Write every figure to this file");
   command.add_option("--errors", arguments->errors, "Write the errors pose by pose to this file (CSV)");
-  command
-      .add_option("--against", arguments->against.benchmark,
-                  "Print the published errors of other systems beside these; without files, those alone")
-      ->check(OneOf(PublishedBenchmarks()));
+  AddOption(command, "--against", arguments->against.benchmark,
+            "Print the published errors of other systems beside these; without files, those alone",
+            OneOf(PublishedBenchmarks()));
   command.add_option("--sequence", arguments->against.sequence,
                      "--against: which sequence it is, if the names of the files don't say it");
-  command.add_option("--sensor", arguments->against.sensor, "--against: what the estimates were made with")
-      ->check(OneOf({"mono", "stereo", "rgbd", "stereo-inertial"}));
-  command
-      .add_option("--max-ate", arguments->max_ate_m,
-                  "Exit status 3 if the ATE (rmse) of an estimate is above this [m]")
-      ->check(NotNegative());
-  command
-      .add_option("--min-coverage", arguments->min_coverage,
-                  "Exit status 3 if an estimate covers less of the reference's time than this share, 0 to 1")
-      ->check(NumberThat([](double value) { return value >= 0 && value <= 1; }, "of 0 to 1", "0..1"));
+  AddOption(command, "--sensor", arguments->against.sensor, "--against: what the estimates were made with",
+            OneOf({"mono", "stereo", "rgbd", "stereo-inertial"}));
+  AddOption(command, "--max-ate", arguments->max_ate_m,
+            "Exit status 3 if the ATE (rmse) of an estimate is above this [m]", NotNegative());
+  AddOption(command, "--min-coverage", arguments->min_coverage,
+            "Exit status 3 if an estimate covers less of the reference's time than this share, 0 to 1",
+            NumberThat([](double value) { return value >= 0 && value <= 1; }, "of 0 to 1", "0..1"));
   command.footer(
-      "ATE is the distance between associated positions after the alignment: is the map where it should be? "
-      "RPE compares\n"
-      "motions over a short distance: how fast does the odometry drift? 'full' is the norm of E - I, with E "
-      "the 4x4 error\n"
-      "matrix. t_rel and r_rel are KITTI's odometry errors; drift is the same over 10 to 50 % of the path, "
-      "so "
-      "that short\n"
-      "paths have one too. Figures agree with evo's (evo_ape, evo_rpe) and with KITTI's development kit.\n"
-      "Coverage is the share of frames within the reference's time that have a pose.\n"
-      "Exit status: 0; 1 for bad input; 3 if --max-ate or --min-coverage is not met.\n"
-      "Examples:\n"
-      "  tutti evaluate groundtruth.txt out/trajectory.txt --align sim3\n"
-      "  tutti evaluate --run out --max-ate 0.05 --min-coverage 0.95\n"
-      "  tutti evaluate MH_01/gt.csv out/trajectory.txt --against euroc --sensor stereo\n"
-      "  tutti evaluate --reference poses/00.txt --times 00/times.txt --estimate out/trajectory.txt\n"
-      "  tutti evaluate gt.txt a.txt b.txt c.txt --table-format latex\n"
-      "  tutti evaluate gt.txt a.txt --rpe-delta 2 --rpe-unit seconds --rpe-all-pairs\n"
-      "Options of evo that mean the same: -a, -s, --align_origin, --n_to_align, --t_max_diff, --t_offset, "
-      "-d/--delta,\n"
-      "-u/--delta_unit, -t/--delta_tol, --all_pairs, --downsample, --motion_filter, --project_to_plane, and "
-      "the words\n"
-      "tum, kitti and euroc before the files.");
+      R"(ATE is the distance between associated positions after the alignment: is the map where it should be? RPE compares
+motions over a short distance: how fast does the odometry drift? 'full' is the norm of E - I, with E the 4x4 error
+matrix. t_rel and r_rel are KITTI's odometry errors; drift is the same over 10 to 50 % of the path, so that short
+paths have one too. Figures agree with evo's (evo_ape, evo_rpe) and with KITTI's development kit.
+Coverage is the share of frames within the reference's time that have a pose.
+Exit status: 0; 1 for bad input; 3 if --max-ate or --min-coverage is not met.
+Examples:
+  tutti evaluate groundtruth.txt out/trajectory.txt --align sim3
+  tutti evaluate --run out --max-ate 0.05 --min-coverage 0.95
+  tutti evaluate MH_01/gt.csv out/trajectory.txt --against euroc --sensor stereo
+  tutti evaluate --reference poses/00.txt --times 00/times.txt --estimate out/trajectory.txt
+  tutti evaluate gt.txt a.txt b.txt c.txt --table-format latex
+  tutti evaluate gt.txt a.txt --rpe-delta 2 --rpe-unit seconds --rpe-all-pairs
+Options of evo that mean the same: -a, -s, --align_origin, --n_to_align, --t_max_diff, --t_offset, -d/--delta,
+-u/--delta_unit, -t/--delta_tol, --all_pairs, --downsample, --motion_filter, --project_to_plane, and the words
+tum, kitti and euroc before the files.)");
   command.callback([arguments, &exit_code] { exit_code = RunEvaluate(*arguments); });
 }
 

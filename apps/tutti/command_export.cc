@@ -2,16 +2,14 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 
 #include "apps/export/map_export.h"
 #include "apps/run/runner.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
-#include "core/terminal.h"
+#include "apps/tutti/options.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
@@ -38,8 +36,6 @@ fs::path MapFile(const std::string& run_or_map) {
   return file;
 }
 
-void Warn(const std::string& warning) { internal::Say("warning: %s", warning.c_str()); }
-
 // Images are not needed for everything: where they can't be had, ExportMap says what it makes of that.
 std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapInfo& info,
                                     const MapSession& session) {
@@ -53,7 +49,7 @@ std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapI
     return OpenDataset(path, options);
   } catch (const InputError& error) {
     if (!arguments.dataset.empty() || request.colmap || request.transforms) throw;
-    Warn(error.what());
+    SayWarnings({error.what()});
     return nullptr;
   }
 }
@@ -63,7 +59,7 @@ void RunExport(const ExportArguments& arguments) {
   const ExportRequest& wanted = arguments.request;
   for (const auto& out : {wanted.landmarks, wanted.transforms, wanted.g2o, wanted.tum})
     KeepInputs({file}, {out.value_or("")});
-  for (const auto& out : {wanted.landmarks, wanted.g2o, wanted.tum}) RequireWritable({out.value_or("")});
+  for (const auto& out : {wanted.landmarks, wanted.g2o, wanted.tum}) CheckFiles({}, {out.value_or("")});
   const MapInfo info = ReadMapInfo(file);
   const std::unique_ptr<SlamSystem> slam = LoadMap(file, info);
   if (slam->odometry() == nullptr)
@@ -84,7 +80,7 @@ void RunExport(const ExportArguments& arguments) {
   model.image_offset = session.frame_offset;
   const std::unique_ptr<Dataset> dataset = OpenImages(arguments, info, session);
   const ExportReport report = ExportMap(std::move(model), dataset.get(), arguments.request);
-  for (const std::string& warning : report.warnings) Warn(warning);
+  SayWarnings(report.warnings);
   for (const ExportedFile& written : report.files) {
     std::printf("%s: %s\n  open with: %s\n", written.path.c_str(), written.content.c_str(),
                 written.open_with.c_str());
@@ -97,36 +93,29 @@ void SetUpExport(CLI::App& command, int&) {
   const auto arguments = std::make_shared<ExportArguments>();
   ExportRequest& request = arguments->request;
   command.add_option("MAP", arguments->map, "folder of `tutti run`, or a map file (map.tutti)")->required();
-  const auto path = [&command](const char* name, std::optional<fs::path>* to, const char* text,
-                               const char* type) {
-    command
-        .add_option_function<std::string>(
-            name, [to](const std::string& value) { *to = value; }, text)
-        ->type_name(type);
-  };
-  path("--landmarks", &request.landmarks,
-       "coloured landmarks with their number of observations, keyframes as pyramids (PLY)", "FILE");
-  path("--colmap", &request.colmap,
-       "COLMAP's sparse model, text and binary, in DIR/sparse/0, undistorted images in DIR/images", "DIR");
-  path("--transforms", &request.transforms,
-       "nerfstudio's DIR/transforms.json, with DIR/images and DIR/sparse_pc.ply beside it", "FILE");
-  path("--g2o", &request.g2o, "pose graph: keyframes, odometry edges, accepted loops", "FILE");
-  path("--tum", &request.tum, "poses of all frames, as in trajectory.txt", "FILE");
-  command
-      .add_option("--images", request.images,
-                  "at most so many images for --colmap and --transforms, of the keyframes: evenly along "
-                  "the way, sharp ones first")
-      ->check(CLI::Range(2, 1000000))
-      ->capture_default_str();
+  AddPath(command, "--landmarks", request.landmarks,
+          "coloured landmarks with their number of observations, keyframes as pyramids (PLY)")
+      ->type_name("FILE");
+  AddPath(command, "--colmap", request.colmap,
+          "COLMAP's sparse model, text and binary, in DIR/sparse/0, undistorted images in DIR/images")
+      ->type_name("DIR");
+  AddPath(command, "--transforms", request.transforms,
+          "nerfstudio's DIR/transforms.json, with DIR/images and DIR/sparse_pc.ply beside it")
+      ->type_name("FILE");
+  AddPath(command, "--g2o", request.g2o, "pose graph: keyframes, odometry edges, accepted loops")
+      ->type_name("FILE");
+  AddPath(command, "--tum", request.tum, "poses of all frames, as in trajectory.txt")->type_name("FILE");
+  AddDefaulted(
+      command, "--images", request.images,
+      "at most so many images for --colmap and --transforms, of the keyframes: evenly along the way, "
+      "sharp ones first",
+      CLI::Range(2, 1000000));
   command.add_option("--dataset", arguments->dataset, "where the images are now (default: where they were)")
       ->type_name("DIR");
-  command
-      .add_option(
-          "--session", arguments->session,
-          "of a map that several recordings made: --tum has the frames of this one alone (counted from "
-          "1; default: all, in the order of their time stamps), and images are its (default: the last "
-          "one's)")
-      ->check(Positive());
+  AddOption(command, "--session", arguments->session,
+            "of a map that several recordings made: --tum has the frames of this one alone (counted from 1; "
+            "default: all, in the order of their time stamps), and images are its (default: the last one's)",
+            Positive());
   command.footer(
       "Poses are those after the last correction. Axes, units and programs: docs/formats.md.\n"
       "A folder must be new, empty, or of an earlier export, which is replaced; files are overwritten.\n"

@@ -4,12 +4,9 @@
 #include <string>
 
 #include "apps/run/localization.h"
-#include "apps/tutti/camera_options.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
-#include "apps/tutti/mask_option.h"
-#include "apps/tutti/view_options.h"
+#include "apps/tutti/recording_options.h"
 #include "core/terminal.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/map_file.h"
@@ -18,38 +15,28 @@ namespace tutti::cli {
 namespace {
 
 struct LocalizeArguments {
-  std::string map, dataset, out, config, mask;
-  CameraWords camera;
-  int start = 0, end = 0, stride = 1, threads = 2;
-  bool quiet = false;
+  LocalizationRequest request;  // what the options say of it themselves
+  std::string dataset, config, mask;
+  CameraRequest camera;
   ViewOptions view;
 };
 
 // 130: ended by Ctrl-C; 1: no frame was found in the map.
 int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
-  LocalizationRequest request;
-  request.map = arguments.map;
+  LocalizationRequest request = arguments.request;
   request.dataset = arguments.dataset;
-  request.out = arguments.out;
-  if (arguments.out.empty()) request.out = DefaultOutput(arguments.dataset, "-localized");
-  request.threads = arguments.threads;
-  request.quiet = arguments.quiet;
+  if (request.out.empty()) request.out = DefaultOutput(arguments.dataset, "-localized");
   if (!arguments.mask.empty()) request.mask = arguments.mask;
-  const CameraRequest camera = CameraOf(command, arguments.camera);
-  if (!arguments.config.empty() || camera.HasLens() || camera.sensor) {
+  if (!arguments.config.empty() || arguments.camera.HasLens() || arguments.camera.sensor) {
     RunConfig config;
     if (arguments.config.empty())
-      config.dataset = ForAnotherRecording(ReadMapInfo(arguments.map).config.dataset);
+      config.dataset = ForAnotherRecording(ReadMapInfo(request.map).config.dataset);
     else
       config = LoadConfig(arguments.config);
-    SetCamera(arguments.dataset, camera, config);
+    SetCamera(arguments.dataset, arguments.camera, config);
     request.options = config.dataset;
   }
-  if (command.count("--start") > 0) request.start = arguments.start;
-  if (command.count("--end") > 0) request.end = arguments.end;
-  if (command.count("--stride") > 0) request.stride = arguments.stride;
-  if (auto view = StartView(command, arguments.view, arguments.quiet))
-    request.observers.push_back(std::move(view));
+  StartView(command, arguments.view, request.quiet, request.observers);
   const Localization result = Localize(request);
   const std::size_t total = result.frames.size() + result.bad;
   std::printf("\n  frames %zu of %zu localized", result.Localized(), total);
@@ -70,28 +57,25 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
 
 void SetUpLocalize(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<LocalizeArguments>();
-  command.add_option("--map", arguments->map, "map.tutti of a run; it is only read")->required();
+  LocalizationRequest& request = arguments->request;
+  command.add_option("--map", request.map, "map.tutti of a run; it is only read")->required();
   command
       .add_option("dataset,--dataset", arguments->dataset,
                   "the recording, as for `tutti run`, of the same camera")
       ->required();
-  command.add_option("--out", arguments->out,
+  command.add_option("--out", request.out,
                      "folder for the results (default: tutti-out/NAME-localized): a new or empty one, or an "
                      "earlier one's");
-  command.add_option(
-      "--config", arguments->config,
-      "YAML file that says how to read the data set (sections dataset and camera); without it, as "
-      "the map's was read");
+  command.add_option("--config", arguments->config,
+                     "YAML file that says how to read the data set (sections dataset and camera); without "
+                     "it, as the map's was read");
   AddCameraOptions(command, arguments->camera);
   AddMaskOption(command, arguments->mask);
-  command.add_option("--start", arguments->start, "first frame that is used, counted from 0")
-      ->check(NotNegative());
-  command.add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
-  command.add_option("--stride", arguments->stride, "use every so many frames")->check(Positive());
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
-      ->check(Positive());
+  AddStart(command, "frame", request.start);
+  AddEndAndStride(command, "frame", request.end, request.stride);
+  AddThreads(command, request.threads);
   AddViewOptions(command, arguments->view);
-  command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
+  command.add_flag("--quiet", request.quiet, "no progress and no notes");
   command.callback([&command, arguments, &exit_code] { exit_code = RunLocalize(command, *arguments); });
 }
 

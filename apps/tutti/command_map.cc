@@ -1,16 +1,19 @@
 // tutti map: what is in a map file, and one without redundant keyframes.
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "apps/run/runner.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
-#include "apps/tutti/map_prune.h"
+#include "apps/tutti/files.h"
+#include "core/replaced_file.h"
+#include "core/section_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
+#include "tutti/slam/slam_system.h"
 
 namespace tutti::cli {
 namespace {
@@ -20,8 +23,8 @@ struct MapArguments {
   bool check = false, json = false;
 };
 
-double Megabytes(const std::string& file) {
-  return static_cast<double>(std::filesystem::file_size(file)) / (1024.0 * 1024.0);
+double Megabytes(const std::filesystem::path& file) {
+  return static_cast<double>(std::filesystem::file_size(file)) / (1 << 20);
 }
 
 // What the run was called with, where a run wrote the map.
@@ -97,24 +100,48 @@ void PrintJson(const MapInfo& info, const std::string& file) {
   json["sessions"] = SessionsJson(info);
   json["least"] = {info.least.x(), info.least.y(), info.least.z()};
   json["most"] = {info.most.x(), info.most.y(), info.most.z()};
-  std::printf("%s\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+  std::fputs(JsonText(json).c_str(), stdout);
 }
 
-int Info(const MapArguments& arguments) {
+void Print(const MapArguments& arguments) {
   const MapInfo info = ReadMapInfo(arguments.file);
   if (arguments.check) CheckMapFile(arguments.file);
-  if (arguments.json) {
-    PrintJson(info, arguments.file);
-  } else {
-    PrintText(info, arguments.file);
-    if (arguments.check) std::printf("  all checksums are right\n");
-  }
-  return 0;
+  if (arguments.json) return PrintJson(info, arguments.file);
+  PrintText(info, arguments.file);
+  if (arguments.check) std::printf("  all checksums are right\n");
+}
+
+// Removes redundant keyframes (SlamSystem::Prune), writes the map to `out`, or back if that is empty, and
+// prints what it was and is. Throws InputError for a file that is no finished map.
+void Prune(const std::filesystem::path& file, const std::filesystem::path& out) {
+  MapInfo info = ReadMapInfo(file);
+  const double megabytes = Megabytes(file);
+  const std::filesystem::path& written = out.empty() ? file : out;
+  internal::CheckWritable(written, internal::Needs::kFile);
+  const std::unique_ptr<SlamSystem> slam =
+      LoadMap(file, info, nullptr, [&file](internal::SectionReader& in) {
+        if (in.Peek() == internal::kEndOfSections) return;
+        throw InputError(file.string() +
+                         ": is a checkpoint; let its run finish (tutti run --resume), and prune the map that "
+                         "it leaves");
+      });
+  slam->Prune();
+  slam->Snapshot(info.note).Write(written);
+  const MapInfo after = ReadMapInfo(written);
+  const auto percent = [](double part, double whole) { return whole > 0 ? 100.0 * part / whole : 100.0; };
+  const auto print = [&](const char* what, int from, int to) {
+    std::printf("  %-10s %8d -> %8d  (%.1f %%)\n", what, from, to, percent(to, from));
+  };
+  print("keyframes", info.keyframes, after.keyframes);
+  print("landmarks", info.landmarks, after.landmarks);
+  const double left = Megabytes(written);
+  std::printf("  %-10s %8.1f -> %8.1f MB (%.1f %%)\n", "size", megabytes, left, percent(left, megabytes));
+  std::printf("  written to %s\n", written.c_str());
 }
 
 }  // namespace
 
-void SetUpMap(CLI::App& command, int& exit_code) {
+void SetUpMap(CLI::App& command, int&) {
   const auto arguments = std::make_shared<MapArguments>();
   command
       .add_option("action", arguments->action,
@@ -126,12 +153,9 @@ void SetUpMap(CLI::App& command, int& exit_code) {
   command.add_flag("--json", arguments->json, "for other programs");
   command.add_option("-o,--out", arguments->out,
                      "prune: the smaller map's file; without it, FILE is replaced");
-  command.callback([arguments, &exit_code] {
-    if (arguments->action == "prune") {
-      PruneMap(arguments->file, arguments->out);
-    } else {
-      exit_code = Info(*arguments);
-    }
+  command.callback([arguments] {
+    if (arguments->action == "prune") return Prune(arguments->file, arguments->out);
+    Print(*arguments);
   });
 }
 

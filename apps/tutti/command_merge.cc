@@ -9,9 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
-#include "apps/tutti/files.h"
+#include "apps/tutti/recording_options.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
@@ -98,8 +97,7 @@ void SetUpMerge(CLI::App& command, int& exit_code) {
       ->required();
   command.add_option("SECOND", arguments->second, "the map that joins it")->required();
   command.add_option("-o,--out", arguments->out, "file for the merged map")->required();
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
-      ->check(Positive());
+  AddThreads(command, arguments->threads);
   command.footer(
       "Without a place that both maps show, nothing is written and the exit status is 1.\n"
       "Example: tutti merge monday/map.tutti tuesday/map.tutti -o both.tutti");

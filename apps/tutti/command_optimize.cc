@@ -9,11 +9,10 @@
 
 #include "apps/run/graph_json.h"
 #include "apps/run/progress.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/options.h"
 #include "core/replaced_file.h"
-#include "core/terminal.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -24,11 +23,18 @@ namespace {
 
 struct OptimizeArguments {
   std::string in, out, json;
-  std::string init = "auto", objective = "chi2", robust = "none", solver = "block",
-              bad_information = "refuse";
+  BadInformation bad_information = BadInformation::kRefuse;
   bool certify = false, ignore_unknown = false;
   PoseGraphOptions options;
 };
+
+/// As --help shows it.
+template <class Enum>
+void AddChoice(CLI::App& command, const std::string& name, Enum& value, Enum without,
+               const std::string& text) {
+  value = without;
+  AddWord(command, name, value, text, WordsOf(value))->default_str(WordOf(value));
+}
 
 nlohmann::ordered_json ToJson(const GraphCosts& costs) {
   return {{"chi2", costs.chi2}, {"chi2log", costs.chi2log}, {"chordal", costs.chordal}};
@@ -69,13 +75,14 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
   json["landmarks"] = file.graph.landmarks().size();
   json["measurements"] = file.graph.measurements().size();
   json["ignored_lines"] = file.ignored;
-  json["bad_information"] = {
-      {"treatment", arguments.bad_information}, {"edges", file.bad_information}, {"skipped", file.skipped}};
-  json["objective"] = arguments.objective;
-  json["robust"] = arguments.robust;
+  json["bad_information"] = {{"treatment", ToString(arguments.bad_information)},
+                             {"edges", file.bad_information},
+                             {"skipped", file.skipped}};
+  json["objective"] = ToString(arguments.options.objective);
+  json["robust"] = ToString(arguments.options.robust);
   json["solver"] = ToString(report.solver);
   json["solver_note"] = report.solver_note;
-  json["init"] = arguments.init;
+  json["init"] = ToString(arguments.options.init);
   json["start"] = ToString(report.start);
   json["starts"] = StartsJson(report.starts);
   json["success"] = report.success;
@@ -162,22 +169,13 @@ void Print(const Certificate& certificate) {
   }
   std::printf("  chordal objective: local optimum %.9g, nothing is below %.9g (gap %.2g, %.3f s)\n",
               certificate.chordal, certificate.lower_bound, certificate.relative_gap, certificate.time_s);
-  if (certificate.certified) {
-    std::printf("  certified global optimum of the chordal objective\n");
-  } else {
-    std::printf("  not certified: %s\n", certificate.reason.c_str());
-  }
-}
-
-void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const PoseGraphReport& report,
-               const std::optional<Certificate>& certificate) {
-  if (arguments.json.empty()) return;
-  internal::WriteFile(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
+  if (certificate.certified) std::printf("  certified global optimum of the chordal objective\n");
+  if (!certificate.certified) std::printf("  not certified: %s\n", certificate.reason.c_str());
 }
 
 G2oFile ReadWithProgress(const OptimizeArguments& arguments) {
   Progress progress("reading", 0);
-  return ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information), arguments.ignore_unknown,
+  return ReadG2o(arguments.in, arguments.bad_information, arguments.ignore_unknown,
                  [&](std::size_t lines) { progress.Say(std::to_string(lines) + " lines"); });
 }
 
@@ -197,26 +195,22 @@ PoseGraphReport OptimizeWithProgress(const PoseGraphOptimizer& optimizer, PoseGr
   });
 }
 
-void RunOptimize(OptimizeArguments arguments) {
-  arguments.options.init = ParseGraphInit(arguments.init);
-  arguments.options.objective = ParseGraphObjective(arguments.objective);
-  arguments.options.robust = ParseRobustLoss(arguments.robust);
-  arguments.options.solver = ParsePoseGraphSolver(arguments.solver);
-  KeepInputs({arguments.in}, {arguments.out, arguments.json});
-  RequireWritable({arguments.out, arguments.json});
+void RunOptimize(const OptimizeArguments& arguments) {
+  CheckFiles({arguments.in}, {arguments.out, arguments.json});
   const PoseGraphOptimizer optimizer(arguments.options);
   G2oFile file = ReadWithProgress(arguments);
-  for (const std::string& warning : file.warnings) internal::Say("warning: %s", warning.c_str());
+  SayWarnings(file.warnings);
   if (arguments.options.init == GraphInit::kFile && !file.has_all_vertices) {
     throw InputError(arguments.in +
-                     ": has edges to nodes without a vertex, so '--init file' has no start; use --init " +
-                     "auto, odometry or chordal");
+                     ": has edges to nodes without a vertex, so '--init file' has no start; use --init auto, "
+                     "odometry or chordal");
   }
   const PoseGraphReport report = OptimizeWithProgress(optimizer, file.graph);
   std::optional<Certificate> certificate;
   if (arguments.certify && report.success)
     certificate = CertifyOptimum(file.graph, {}, report.chordal_optimum);
-  WriteJson(arguments, file, report, certificate);
+  if (!arguments.json.empty())
+    internal::WriteFile(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
   if (!report.success) throw InputError(arguments.in + ": could not be optimised: " + report.reason);
   WriteG2o(arguments.out, file.graph);
   Print(file, report);
@@ -229,53 +223,35 @@ void SetUpOptimize(CLI::App& command, int&) {
   const auto arguments = std::make_shared<OptimizeArguments>();
   command.add_option("IN", arguments->in, "Graph to read (.g2o)")->required();
   command.add_option("--out", arguments->out, "Where the optimised graph goes (.g2o)")->required();
-  command
-      .add_option("--init", arguments->init,
-                  "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, often "
-                  "near the global minimum where the others are not, and without --robust the optimum of the "
-                  "chordal objective, too: the better result counts; auto: the one with the lowest cost")
-      ->check(OneOf(GraphInit()))
-      ->capture_default_str();
-  command
-      .add_option("--objective", arguments->objective,
-                  "chi2: g2o's error (vector part of the quaternion); chi2log: rotation vectors")
-      ->check(OneOf(GraphObjective()))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--robust", arguments->robust,
-          "Robust loss on loops: edges between poses whose ids do not follow each other among those of the "
-          "file (of one robot, docs/backend.md). gnc: graduated non-convexity, then inlier or outlier; "
-          "withstands the most false loops. dcs: weights down to 0; huber and cauchy: smaller weights; none: "
-          "least squares")
-      ->check(OneOf(RobustLoss()))
-      ->capture_default_str();
-  command
-      .add_option("--solver", arguments->solver,
-                  "block: Levenberg-Marquardt with a Cholesky of the poses' blocks, the faster one; ceres: "
-                  "Ceres Solver, the same optimum")
-      ->check(OneOf(PoseGraphSolver()))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--bad-information", arguments->bad_information,
-          "Edges whose information matrix is not positive definite. refuse: the file, with their "
-          "number; project: the nearest positive semidefinite matrix (negative eigenvalues become 0); "
-          "diagonal: the positive entries of its diagonal; skip: without these edges, unless the "
-          "graph falls apart then")
-      ->check(OneOf(BadInformation()))
-      ->capture_default_str();
+  PoseGraphOptions& options = arguments->options;
+  AddChoice(
+      command, "--init", options.init, GraphInit::kAuto,
+      "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, often near the "
+      "global minimum where the others are not, and without --robust the optimum of the chordal "
+      "objective, too: the better result counts; auto: the one with the lowest cost");
+  AddChoice(command, "--objective", options.objective, GraphObjective::kChi2,
+            "chi2: g2o's error (vector part of the quaternion); chi2log: rotation vectors");
+  AddChoice(
+      command, "--robust", options.robust, RobustLoss::kNone,
+      "Robust loss on loops: edges between poses whose ids do not follow each other among those of the "
+      "file (of one robot, docs/backend.md). gnc: graduated non-convexity, then inlier or outlier; "
+      "withstands the most false loops. dcs: weights down to 0; huber and cauchy: smaller weights; none: "
+      "least squares");
+  AddChoice(command, "--solver", options.solver, PoseGraphSolver::kBlock,
+            "block: Levenberg-Marquardt with a Cholesky of the poses' blocks, the faster one; ceres: Ceres "
+            "Solver, the same optimum");
+  AddChoice(
+      command, "--bad-information", arguments->bad_information, BadInformation::kRefuse,
+      "Edges whose information matrix is not positive definite. refuse: the file, with their number; "
+      "project: the nearest positive semidefinite matrix (negative eigenvalues become 0); diagonal: the "
+      "positive entries of its diagonal; skip: without these edges, unless the graph falls apart then");
   command.add_flag("--ignore-unknown", arguments->ignore_unknown,
                    "Leave out lines whose tag tutti does not know, with a warning; without this the file is "
                    "refused");
-  command
-      .add_option("--robust-chi2", arguments->options.robust_chi2,
-                  "Chi-square beyond which a loop is an outlier; 0: the 99 % quantile")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command.add_option("--max-iterations", arguments->options.max_iterations, "Levenberg-Marquardt iterations")
-      ->check(Positive())
-      ->capture_default_str();
+  AddDefaulted(command, "--robust-chi2", options.robust_chi2,
+               "Chi-square beyond which a loop is an outlier; 0: the 99 % quantile", NotNegative());
+  AddDefaulted(command, "--max-iterations", options.max_iterations, "Levenberg-Marquardt iterations",
+               Positive());
   command.add_flag(
       "--certify", arguments->certify,
       "Prove that the chordal objective has no lower value (as SE-Sync does), or say how far the "
@@ -283,10 +259,9 @@ void SetUpOptimize(CLI::App& command, int&) {
   command.add_option("--json", arguments->json,
                      "Write costs, time and what became of the loops to this file");
   command.footer(
-      "Costs are sums over all edges without a robust loss and without the factor 1/2. Compare only costs of "
-      "the same\n"
-      "column. A loop that is rejected keeps its place in the output file.\n"
-      "Example: tutti optimize graph.g2o --out optimised.g2o --robust gnc --json costs.json");
+      R"(Costs are sums over all edges without a robust loss and without the factor 1/2. Compare only costs of the same
+column. A loop that is rejected keeps its place in the output file.
+Example: tutti optimize graph.g2o --out optimised.g2o --robust gnc --json costs.json)");
   command.callback([arguments] { RunOptimize(*arguments); });
 }
 

@@ -4,23 +4,15 @@
 #include <memory>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "apps/report/page.h"
 #include "apps/run/focal_length.h"
 #include "apps/run/outputs.h"
-#include "apps/run/recording.h"
-#include "apps/run/runner.h"
-#include "apps/tutti/camera_options.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
-#include "apps/tutti/configuration_of.h"
-#include "apps/tutti/exit_code.h"
 #include "apps/tutti/files.h"
-#include "apps/tutti/mask_option.h"
+#include "apps/tutti/recording_options.h"
 #include "apps/tutti/run_with_report.h"
-#include "apps/tutti/view_options.h"
+#include "apps/tutti/text_table.h"
 #include "core/example_configs.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
@@ -36,26 +28,20 @@ namespace {
 namespace fs = std::filesystem;
 
 struct RunArguments {
-  std::string config, dataset, out, ground_truth;
-  std::string trace, resume, map, save_map;
-  std::string mask, require = "doubtful";
-  CameraWords camera;
+  RunRequest request;  // what the options say of it themselves
+  std::string config, dataset, resume, mask;
+  CameraRequest camera;
   int rotate = 0;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
-  bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
-       advanced = false, timing = false, realtime = false, no_map = false;
-  std::uint64_t seed = 1;
-  int threads = 2;
-  int inject_false_loops = 0;
-  int start = 0, end = 0, stride = 1;
+  bool help_config = false, advanced = false, no_map = false;
   double follow_s = 10, checkpoint_s = 30;
   ViewOptions view;
+  OutcomeOptions outcome;
 };
 
-int RunAndShow(const RunArguments& arguments, RunRequest request, const RunConfig& config) {
-  const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
-  std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
-  if (arguments.timing) {
+int RunAndShow(const RunArguments& arguments, const RunRequest& request, const RunConfig& config) {
+  const RunResult result = RunAndPrint(request, config, arguments.outcome);
+  if (request.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
     if (result.odometry_alone_cpu_s > 0)
       std::printf("  the odometry without loops: %.1f s more\n", result.odometry_alone_cpu_s);
@@ -63,12 +49,11 @@ int RunAndShow(const RunArguments& arguments, RunRequest request, const RunConfi
   std::printf("\n  results are in %s\n", internal::Printable(result.folder.string()).c_str());
   const fs::path report = fs::path(result.folder) / "report.html";
   std::error_code ignored;
-  if (!arguments.no_report && fs::exists(report, ignored))
+  if (!arguments.outcome.no_report && fs::exists(report, ignored))
     std::printf("  look at %s\n", internal::Printable(fs::absolute(report, ignored).string()).c_str());
-  if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
-    internal::Say("%s", ReportsMissing().c_str());
-  return ExitCode(result, arguments.require);
+  return Conclude(result, arguments.outcome);
 }
+
 // What a run can be told that goes on: the rest is as it was.
 void RefuseOthers(const CLI::App& command, const RunArguments& arguments) {
   const std::set<std::string> allowed = {"--resume",    "--threads",   "--quiet",        "--view",
@@ -98,37 +83,31 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
     return 0;
   }
   auto& [request, config, map, ltm_file] = *found;
+  const RunRequest& given = arguments.request;
   const auto keep = [&](const std::string& file, bool said, const char* option) {
-    if (file.empty() || said || arguments.quiet) return;
+    if (file.empty() || said || arguments.outcome.quiet) return;
     internal::Say("the run also wrote %s; to have it written again, give %s%s", file.c_str(), option,
                   file.c_str());
   };
-  keep(map, !arguments.save_map.empty() || arguments.no_map, "--save-map ");
+  keep(map, given.save_map || arguments.no_map, "--save-map ");
   keep(ltm_file, !arguments.set.empty(), "--set loops.ltm_file=");
   SetOptions(arguments.set, config);
-  request.quiet = arguments.quiet;
-  request.timing = arguments.timing;
-  if (!arguments.trace.empty()) request.trace = arguments.trace;
-  if (command.count("--threads") > 0) request.threads = arguments.threads;
+  request.quiet = arguments.outcome.quiet;
+  request.timing = given.timing;
+  if (given.trace) request.trace = given.trace;
+  if (given.threads) request.threads = given.threads;
   if (command.count("--checkpoint") > 0) request.checkpoint_s = arguments.checkpoint_s;
-  if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
+  if (given.save_map) request.save_map = given.save_map;
   if (arguments.no_map) request.save_map.reset();
-  if (auto view = StartView(command, arguments.view, arguments.quiet))
-    request.observers.push_back(std::move(view));
-  return RunAndShow(arguments, std::move(request), config);
+  StartView(command, arguments.view, arguments.outcome.quiet, request.observers);
+  return RunAndShow(arguments, request, config);
 }
 
 // What the map was made with, for a recording of which all frames are used.
-RunConfig ConfigOfMap(const std::string& map) {
+RunConfig ConfigOfMap(const fs::path& map) {
   RunConfig config = ReadMapInfo(map).config;
   config.dataset = ForAnotherRecording(config.dataset);
   return config;
-}
-
-std::string Pixels(double focal_px) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.1f px", focal_px);
-  return text;
 }
 
 void SetImageUse(const RunArguments& arguments, DatasetOptions& options) {
@@ -139,7 +118,7 @@ void SetImageUse(const RunArguments& arguments, DatasetOptions& options) {
 // Where nothing says what the focal length is, the images may.
 void MeasureGuess(const RunArguments& arguments, Recording& recording, RunRequest& request) {
   const auto say = [&](const std::string& text) {
-    if (!arguments.quiet)
+    if (!arguments.outcome.quiet)
       std::fputs(internal::Message("  camera  " + text).c_str(), internal::StandardError());
   };
   say("measuring the focal length on the first frames ...");
@@ -149,36 +128,34 @@ void MeasureGuess(const RunArguments& arguments, Recording& recording, RunReques
   if (request.stride) range.dataset.stride = *request.stride;
   const FocalLength found = MeasureFocalLength(arguments.dataset, range);
   request.focal_length = found;
-  char text[200];
   if (found.measured) {
     recording.config.dataset.camera = found.camera;
-    std::snprintf(text, sizeof text, "focal length measured on %d frames: %.1f px, give or take %.1f %%",
-                  found.frames, found.camera.fx, 100 * found.sigma);
+    request.camera_source = Formatted("focal length measured on %d frames: %.1f px, give or take %.1f %%",
+                                      found.frames, found.camera.fx, 100 * found.sigma);
   } else {
     request.camera_guessed = recording.photo_lens.empty();
     const std::string source =
-        request.camera_guessed ? "guessed, " + Pixels(found.camera.fx) : recording.photo_lens;
-    std::snprintf(text, sizeof text, "focal length %s: in the first %d frames %s", source.c_str(),
-                  found.frames, found.reason.c_str());
+        request.camera_guessed ? Formatted("guessed, %.1f px", found.camera.fx) : recording.photo_lens;
+    request.camera_source = Formatted("focal length %s: in the first %d frames %s", source.c_str(),
+                                      found.frames, found.reason.c_str());
   }
-  request.camera_source = text;
-  say(text);
+  say(request.camera_source);
 }
 
 // From a file, or from the map to go on in, or from what the recording is.
-RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, RunRequest& request) {
-  if (!arguments.config.empty() || !arguments.map.empty()) {
-    RunConfig config = arguments.config.empty() ? ConfigOfMap(arguments.map) : LoadConfig(arguments.config);
-    SetCamera(arguments.dataset, camera, config);
+RunConfig ConfigFor(const RunArguments& arguments, RunRequest& request) {
+  if (!arguments.config.empty() || request.map) {
+    RunConfig config = arguments.config.empty() ? ConfigOfMap(*request.map) : LoadConfig(arguments.config);
+    SetCamera(arguments.dataset, arguments.camera, config);
     SetImageUse(arguments, config.dataset);
     return config;
   }
   RunConfig asked;
   SetOptions(arguments.set, asked);
-  CameraRequest wanted = camera;
+  CameraRequest wanted = arguments.camera;
   wanted.depth_units_per_m = asked.dataset.depth_units_per_m;
   Recording recording = Recognise(arguments.dataset, wanted);
-  if (!arguments.quiet) SayFindings(recording);
+  if (!arguments.outcome.quiet) SayFindings(recording);
   SetImageUse(arguments, recording.config.dataset);
   SetOptions(arguments.set, recording.config);
   if (recording.guessed_lens && IsCamera(arguments.dataset)) {
@@ -190,13 +167,8 @@ RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, 
   return recording.config;
 }
 
-fs::path OutputOf(const RunArguments& arguments) {
-  if (!arguments.out.empty()) return arguments.out;
-  return DefaultOutput(IsCamera(arguments.dataset) ? "camera" : arguments.dataset);
-}
-
 // Before the images are read, to measure a focal length for example. A file in --out has its folder later.
-void CheckFiles(const RunRequest& request) {
+void CheckRequest(const RunRequest& request) {
   OutputFolder::Check(request.out, RunLayout(), request.trace);
   if (request.ground_truth && *request.ground_truth != "none")
     internal::RequireFile(*request.ground_truth, "give --ground-truth FILE or none");
@@ -220,43 +192,30 @@ int RunOnce(const CLI::App& command, const RunArguments& arguments) {
     throw InputError(
         "run: which recording? Give its folder, a video file, a bag or camera:0: tutti run DATASET");
   }
-  RunRequest request;
+  RunRequest request = arguments.request;
   request.config = arguments.config;
   request.dataset = arguments.dataset;
-  request.out = OutputOf(arguments);
-  request.no_loops = arguments.no_loops;
-  request.quiet = arguments.quiet;
-  request.keep = arguments.keep;
+  if (request.out.empty())
+    request.out = DefaultOutput(IsCamera(arguments.dataset) ? "camera" : arguments.dataset);
+  request.quiet = arguments.outcome.quiet;
   if (command.count("--follow") > 0) request.follow_s = arguments.follow_s;
-  // A camera does not wait.
-  request.realtime = arguments.realtime || IsCameraDevice(arguments.dataset);
-  request.timing = arguments.timing;
-  if (!arguments.trace.empty()) request.trace = arguments.trace;
-  if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
-  if (command.count("--seed") > 0) request.seed = arguments.seed;
-  if (command.count("--threads") > 0) request.threads = arguments.threads;
-  if (command.count("--inject-false-loops") > 0) request.inject_false_loops = arguments.inject_false_loops;
-  if (command.count("--start") > 0) request.start = arguments.start;
-  if (command.count("--end") > 0) request.end = arguments.end;
-  if (command.count("--stride") > 0) request.stride = arguments.stride;
   if (command.count("--checkpoint") > 0) request.checkpoint_s = arguments.checkpoint_s;
+  request.realtime = request.realtime || IsCameraDevice(arguments.dataset);  // a camera does not wait
   if (request.checkpoint_s && request.realtime)
     throw InputError("run: --checkpoint: in real time, or with a camera, there is no going on later");
-  if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
-  if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
-  if (!arguments.map.empty()) request.map = arguments.map;
-  CheckFiles(request);
-  if (auto view = StartView(command, arguments.view, arguments.quiet))
-    request.observers.push_back(std::move(view));
-  RunConfig config = ConfigFor(CameraOf(command, arguments.camera), arguments, request);
+  if (!request.save_map && !arguments.no_map) request.save_map = kMap;
+  CheckRequest(request);
+  StartView(command, arguments.view, request.quiet, request.observers);
+  RunConfig config = ConfigFor(arguments, request);
   SetOptions(arguments.set, config);
-  return RunAndShow(arguments, std::move(request), config);
+  return RunAndShow(arguments, request, config);
 }
 
 }  // namespace
 
 void SetUpRun(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<RunArguments>();
+  RunRequest& request = arguments->request;
   command.add_option(
       "dataset,--dataset", arguments->dataset,
       "the recording: folder of a data set or of images, a video file, a ROS bag, or a camera: camera:0 (the "
@@ -270,79 +229,67 @@ void SetUpRun(CLI::App& command, int& exit_code) {
                          "was found is said");
   AddCameraOptions(command, arguments->camera);
   AddMaskOption(command, arguments->mask);
-  command
-      .add_option("--rotate", arguments->rotate,
-                  "turn the images so far clockwise, so that they are upright; the camera is given as it is, "
-                  "before that, and is turned with them. Not for stereo")
-      ->check(OneOf({"90", "180", "270"}));
-  command.add_option("--out", arguments->out,
+  AddOption(
+      command, "--rotate", arguments->rotate,
+      "turn the images so far clockwise, so that they are upright; the camera is given as it is, before "
+      "that, and is turned with them. Not for stereo",
+      OneOf({"90", "180", "270"}));
+  command.add_option("--out", request.out,
                      "folder for the results (default: tutti-out/NAME): a new or empty one, or that of an "
                      "earlier run, whose results are replaced when the new ones are complete");
   command.add_flag(
-      "--keep", arguments->keep,
+      "--keep", request.keep,
       "don't replace earlier results in --out: move them into OUT/1, the next ones into OUT/2, ...");
-  command.add_option("--map", arguments->map,
-                     "map.tutti of an earlier run: go on in it, as another session; the map that is written "
-                     "holds both. Without --config, the map's configuration is used");
+  AddPath(command, "--map", request.map,
+          "map.tutti of an earlier run: go on in it, as another session; the map that is written holds both. "
+          "Without --config, the map's configuration is used");
   command.add_flag("--no-map", arguments->no_map, "don't write the map (OUT/map.tutti)");
-  command.add_option("--save-map", arguments->save_map,
-                     "write the map to this file instead of OUT/map.tutti");
-  command
-      .add_option("--checkpoint", arguments->checkpoint_s,
-                  "while running, write OUT/checkpoint.tutti at most every SECONDS (default 30), from which "
-                  "--resume goes on after a crash")
+  AddPath(command, "--save-map", request.save_map, "write the map to this file instead of OUT/map.tutti");
+  AddOption(
+      command, "--checkpoint", arguments->checkpoint_s,
+      "while running, write OUT/checkpoint.tutti at most every SECONDS (default 30), from which --resume "
+      "goes on after a crash",
+      NotNegative())
       ->expected(0, 1)
-      ->type_name("SECONDS")
-      ->check(NotNegative());
+      ->type_name("SECONDS");
   command.add_option("--resume", arguments->resume,
                      "OUT: go on with the run in this folder that was broken off, from its last checkpoint; "
                      "the results are those of a run that never stopped. Needs no other option");
-  command.add_option(
-      "--ground-truth", arguments->ground_truth,
-      "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
+  AddPath(command, "--ground-truth", request.ground_truth,
+          "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
   command.add_option(
       "--set", arguments->set,
       "SECTION.KEY=VALUE: any key of --help-config --advanced, on top of the file (loops.rule=orb, "
       "odometry.features=900, loops.extraction.features=300); may be given several times");
-  command.add_flag("--no-loops", arguments->no_loops, "odometry alone");
-  command.add_option("--seed", arguments->seed, "of everything that draws random numbers")
-      ->check(NotNegative());
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
-      ->check(Positive());
-  command
-      .add_option(
-          "--inject-false-loops", arguments->inject_false_loops,
-          "test of the back end: add so many false loops (random relative poses, wrong places, pairs that "
-          "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
-          "weight)")
-      ->check(NotNegative());
-  command.add_option("--start", arguments->start, "first frame that is used, counted from 0")
-      ->check(NotNegative());
-  command.add_option("--end", arguments->end, "frame before which to stop (--end 600: frames 0 to 599)")
-      ->check(Positive());
-  command.add_option("--stride", arguments->stride, "use every so many frames, from the first on")
-      ->check(Positive());
-  command
-      .add_option(
-          "--follow", arguments->follow_s,
-          "the folder is still being written to: wait for new images, and end when none came for SECONDS "
-          "(default 10), or with Ctrl-C")
+  command.add_flag("--no-loops", request.no_loops, "odometry alone");
+  AddSeed(command, request.seed);
+  AddThreads(command, request.threads);
+  AddOption(
+      command, "--inject-false-loops", request.inject_false_loops,
+      "test of the back end: add so many false loops (random relative poses, wrong places, pairs that "
+      "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
+      "weight)",
+      NotNegative());
+  AddStart(command, "frame", request.start);
+  AddOption(command, "--end", request.end, "frame before which to stop (--end 600: frames 0 to 599)",
+            Positive());
+  AddOption(command, "--stride", request.stride, "use every so many frames, from the first on", Positive());
+  AddOption(command, "--follow", arguments->follow_s,
+            "the folder is still being written to: wait for new images, and end when none came for SECONDS "
+            "(default 10), or with Ctrl-C",
+            Positive())
       ->expected(0, 1)
-      ->type_name("SECONDS")
-      ->check(Positive());
+      ->type_name("SECONDS");
   command.add_flag(
-      "--realtime", arguments->realtime,
+      "--realtime", request.realtime,
       "play by the time stamps and drop the frames that it can't follow; without it every frame is "
       "processed, and the result does not depend on the machine's speed");
   AddViewOptions(command, arguments->view);
-  command.add_flag("--timing", arguments->timing,
+  command.add_flag("--timing", request.timing,
                    "print how long each stage took: calls, median, p99, total, share");
-  command.add_option(
-      "--trace", arguments->trace,
-      "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
-  AddRequireOption(command, arguments->require);
-  command.add_flag("--no-report", arguments->no_report, "no report.html and report.json");
-  command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
+  AddPath(command, "--trace", request.trace,
+          "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
+  AddOutcomeOptions(command, arguments->outcome);
   command.add_flag("--help-config", arguments->help_config,
                    "print the keys of the configuration that users set, with their defaults");
   command.add_flag("--advanced", arguments->advanced, "with --help-config: all keys");

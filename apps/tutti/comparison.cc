@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <tuple>
+#include <utility>
 
-#include "apps/tutti/comparison_columns.h"
+#include "apps/report/run_report.h"
+#include "apps/report/page.h"
 #include "apps/tutti/files.h"
-#include "apps/tutti/stage_times.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
-#include "tutti/core/significance.h"
 
 namespace tutti::cli {
 namespace {
@@ -45,30 +45,45 @@ double StudentQuantile(double p, double degrees) {
   return 0.5 * (low + high);
 }
 
-template <typename Key>
-std::vector<std::string> InOrder(const std::vector<RunFigures>& runs, const Key& key) {
-  std::vector<std::string> out;
-  for (const RunFigures& run : runs) {
-    if (std::find(out.begin(), out.end(), key(run)) == out.end()) out.push_back(key(run));
-  }
+/// The runs of one data set.
+struct DatasetRuns {
+  std::string name;
+  std::vector<Variant> variants;
+};
+
+std::vector<DatasetRuns> Grouped(const std::vector<RunFigures>& runs) {
+  const auto entry = [](auto& list, const std::string& name) -> auto& {
+    for (auto& known : list) {
+      if (known.name == name) return known;
+    }
+    list.push_back({name, {}});
+    return list.back();
+  };
+  std::vector<DatasetRuns> out;
+  for (const RunFigures& run : runs)
+    entry(entry(out, run.dataset).variants, run.variant).runs.push_back(&run);
   return out;
 }
 
-std::vector<Variant> Variants(const Comparison& comparison, const std::string& dataset) {
-  std::vector<RunFigures> here;
-  for (const RunFigures& run : comparison.runs) {
-    if (run.dataset == dataset) here.push_back(run);
-  }
-  std::vector<Variant> out;
-  for (const std::string& name : InOrder(here, [](const RunFigures& run) { return run.variant; })) {
-    Variant variant{name, {}};
-    for (const RunFigures& run : comparison.runs) {
-      if (run.dataset == dataset && run.variant == name) variant.runs.push_back(&run);
-    }
-    out.push_back(variant);
-  }
-  return out;
-}
+/// A figure of ComparisonJson, and where a summary.json has it; null: it is summed up.
+struct Figure {
+  const char* name;
+  const char* path;
+  double RunFigures::*field;
+};
+constexpr Figure kFigures[] = {
+    {"loops_proposed", "loops/proposed", &RunFigures::proposed},
+    {"loops_accepted", "loops/accepted", &RunFigures::accepted},
+    {"loops_false", "loops/false", &RunFigures::false_loops},
+    {"ate_rmse_m", "evaluation/slam/ate_rmse_m", &RunFigures::ate_m},
+    {"rpe_rmse_m", "evaluation/slam/rpe_rmse_m", &RunFigures::rpe_m},
+    {"t_rel_percent", "evaluation/slam/kitti_translation_percent", &RunFigures::t_rel_percent},
+    {"r_rel_deg_per_m", "evaluation/slam/kitti_rotation_deg_per_m", &RunFigures::r_rel_deg_per_m},
+    {"wall_s", "timing/wall_s", &RunFigures::wall_s},
+    {"odometry_s", nullptr, &RunFigures::odometry_s},
+    {"loops_s", nullptr, &RunFigures::loops_s},
+    {"frame_ms_median", "timing/frame_ms/median", &RunFigures::frame_ms},
+    {"peak_memory_mb", "memory/peak_mb", &RunFigures::memory_mb}};
 
 /// What the runs of a table differ in, for a reader: "first frame (0 to 4); noise drawn anew, ...".
 std::string WhatVaries(const std::vector<Variant>& variants) {
@@ -146,20 +161,7 @@ Json VariantJson(const Variant& variant, const std::vector<Variant>& all) {
       json["failures"].back()["reason"] = run->failure;
     }
   }
-  const std::vector<std::pair<const char*, double RunFigures::*>> fields = {
-      {"loops_proposed", &RunFigures::proposed},
-      {"loops_accepted", &RunFigures::accepted},
-      {"loops_false", &RunFigures::false_loops},
-      {"ate_rmse_m", &RunFigures::ate_m},
-      {"rpe_rmse_m", &RunFigures::rpe_m},
-      {"t_rel_percent", &RunFigures::t_rel_percent},
-      {"r_rel_deg_per_m", &RunFigures::r_rel_deg_per_m},
-      {"wall_s", &RunFigures::wall_s},
-      {"odometry_s", &RunFigures::odometry_s},
-      {"loops_s", &RunFigures::loops_s},
-      {"frame_ms_median", &RunFigures::frame_ms},
-      {"peak_memory_mb", &RunFigures::memory_mb}};
-  for (const auto& [name, field] : fields) json[name] = IntervalJson(Over(variant, field));
+  for (const Figure& figure : kFigures) json[figure.name] = IntervalJson(Over(variant, figure.field));
   json["stages_s"] = Json::object();
   for (const std::string& stage : StageOrder({variant}))
     json["stages_s"][stage] = IntervalJson(StageOver(variant, stage));
@@ -216,16 +218,9 @@ RunFigures ReadRunFigures(const std::filesystem::path& summary) {
                 static_cast<int>(whole("config/dataset/noise_draw")),
                 static_cast<std::uint64_t>(whole("seed"))};
   if (Number(json, "config/dataset/noise") > 0) run.sample.noise = Number(json, "config/dataset/noise");
-  run.proposed = Number(json, "loops/proposed");
-  run.accepted = Number(json, "loops/accepted");
-  run.false_loops = Number(json, "loops/false");
-  run.ate_m = Number(json, "evaluation/slam/ate_rmse_m");
-  run.rpe_m = Number(json, "evaluation/slam/rpe_rmse_m");
-  run.t_rel_percent = Number(json, "evaluation/slam/kitti_translation_percent");
-  run.r_rel_deg_per_m = Number(json, "evaluation/slam/kitti_rotation_deg_per_m");
-  run.wall_s = Number(json, "timing/wall_s");
-  run.frame_ms = Number(json, "timing/frame_ms/median");
-  run.memory_mb = Number(json, "memory/peak_mb");
+  for (const Figure& figure : kFigures) {
+    if (figure.path != nullptr) run.*figure.field = Number(json, figure.path);
+  }
   run.stages_s = StageSeconds(json);
   run.odometry_s = WorkSeconds(run.stages_s, "odometry_");
   run.loops_s = WorkSeconds(run.stages_s, "loop_");
@@ -259,11 +254,10 @@ std::string IntervalCell(const MeanInterval& value, int decimals) {
   return text;
 }
 
-std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison, const TableChoice& choice) {
+std::vector<ComparisonTable> ComparisonTables(const std::vector<RunFigures>& runs,
+                                              const TableChoice& choice) {
   std::vector<ComparisonTable> tables;
-  for (const std::string& dataset :
-       InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
-    const std::vector<Variant> variants = Variants(comparison, dataset);
+  for (const auto& [dataset, variants] : Grouped(runs)) {
     std::vector<std::string> notes = Verdict(variants);
     notes.insert(notes.begin(), "What varies between the runs of a variant: " + WhatVaries(variants) + ".");
     tables.push_back({dataset, FiguresTable(variants, choice), StageTable(variants), std::move(notes)});
@@ -271,8 +265,9 @@ std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison, cons
   return tables;
 }
 
-std::string DescribeComparison(const Comparison& comparison, TableFormat format, const TableChoice& choice) {
-  const std::vector<ComparisonTable> tables = ComparisonTables(comparison, choice);
+std::string DescribeComparison(const std::vector<RunFigures>& runs, TableFormat format,
+                               const TableChoice& choice) {
+  const std::vector<ComparisonTable> tables = ComparisonTables(runs, choice);
   if (format == TableFormat::kCsv) return Render(AsOneTable(tables), format);
   std::string text;
   for (const ComparisonTable& table : tables) {
@@ -283,21 +278,42 @@ std::string DescribeComparison(const Comparison& comparison, TableFormat format,
   }
   return text +
          "Means over the runs, +- half of the 95 % confidence interval; p: paired t-test of the ATE against "
-         "the "
-         "ensemble's, from " +
+         "the ensemble's, from " +
          std::to_string(kLeastPairs) + " pairs on.\n";
 }
 
-Json ComparisonJson(const Comparison& comparison) {
+Json ComparisonJson(const std::vector<RunFigures>& runs) {
   Json json = {{"datasets", Json::array()}};
-  for (const std::string& dataset :
-       InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
-    const std::vector<Variant> variants = Variants(comparison, dataset);
+  for (const auto& [dataset, variants] : Grouped(runs)) {
     Json entry = {{"dataset", dataset}, {"varies", WhatVaries(variants)}, {"variants", Json::array()}};
     for (const Variant& variant : variants) entry["variants"].push_back(VariantJson(variant, variants));
     json["datasets"].push_back(entry);
   }
   return json;
+}
+
+void WriteComparisonReport(const std::filesystem::path& file, const std::string& title,
+                           const std::vector<RunFigures>& runs) {
+  std::vector<ReportTable> tables;
+  for (const ComparisonTable& table : ComparisonTables(runs))
+    tables.push_back({table.dataset, table.table.header, table.table.rows, table.notes, table.stages.header,
+                      table.stages.rows});
+  std::vector<Json> reports;
+  std::vector<std::string> failures;
+  for (const RunFigures& run : runs) {
+    const std::string name = run.variant + ", " + Describe(run.sample) + ": ";
+    if (!run.failure.empty()) failures.push_back(name + run.failure);
+    try {
+      auto report = ReadRunReport(run.folder);
+      if (!report) continue;
+      (*report)["variant"] = run.variant;
+      reports.push_back(std::move(*report));
+    } catch (const InputError& error) {
+      failures.push_back(name + "no charts: " + error.what());
+      internal::Say("warning: no charts of a run: %s", error.what());
+    }
+  }
+  WriteReportPage(file, ComparisonPage(title, tables, std::move(reports), failures));
 }
 
 }  // namespace tutti::cli

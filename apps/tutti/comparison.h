@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/tutti/text_table.h"
+#include "tutti/core/significance.h"
 
 namespace tutti::cli {
 
@@ -63,11 +64,6 @@ MeanInterval MeanWithInterval(const std::vector<double>& values);
 /// "mean +- half-width", the mean alone where there is no interval, "-" where there is no value.
 std::string IntervalCell(const MeanInterval& value, int decimals);
 
-/// Runs in groups: by data set, then by variant, both in the order of their first appearance.
-struct Comparison {
-  std::vector<RunFigures> runs;
-};
-
 /// The table of one data set, and what it says below.
 struct ComparisonTable {
   std::string dataset;
@@ -82,13 +78,45 @@ struct TableChoice {
   std::optional<int> decimals;       ///< of errors; nothing: those that fit each column
   bool bold_best = false;            ///< the best mean of each column of errors, times and memory
 };
-std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison, const TableChoice& choice = {});
+/// Of the runs in groups: by data set, then by variant, both in the order of their first appearance.
+std::vector<ComparisonTable> ComparisonTables(const std::vector<RunFigures>& runs,
+                                              const TableChoice& choice = {});
 
 /// One table per data set and one of the time per stage, with the paired t-test of each variant's ATE against
 /// the ensemble's over common samples (from kLeastPairs on), and below it what varies between the runs, which
 /// variants the ensemble beats, and which it does not. CSV: the first table alone, for all data sets.
-std::string DescribeComparison(const Comparison& comparison, TableFormat format,
+std::string DescribeComparison(const std::vector<RunFigures>& runs, TableFormat format,
                                const TableChoice& choice = {});
-nlohmann::ordered_json ComparisonJson(const Comparison& comparison);
+nlohmann::ordered_json ComparisonJson(const std::vector<RunFigures>& runs);
+/// The page of a comparison (report.html), or removes an older one if pages are left out. Runs without a
+/// report.json are in the table alone.
+void WriteComparisonReport(const std::filesystem::path& file, const std::string& title,
+                           const std::vector<RunFigures>& runs);
+
+// The columns of a table of runs, and their time per stage: timing.stage_ms of their summary.json
+// (docs/outputs.md).
+
+constexpr const char* kEnsemble = "ensemble";
+
+MeanInterval Over(const Variant& variant, double RunFigures::*field);
+/// ATE of the variant minus that of the ensemble, over the samples that both have.
+PairedTTestResult AgainstEnsemble(const Variant& variant, const std::vector<Variant>& all);
+
+/// Words for columns, in the order of the whole table. The variant's name is always the first column.
+std::vector<std::string> ComparisonColumns();
+/// A row for each variant.
+TextTable FiguresTable(const std::vector<Variant>& variants, const TableChoice& choice);
+
+/// Seconds by stage; empty if the summary has none.
+std::map<std::string, double> StageSeconds(const nlohmann::ordered_json& summary);
+/// Sum of the stages whose name begins so, without those that only wait for others (read_wait, loop_wait,
+/// loop_inline); NaN for no stages at all.
+double WorkSeconds(const std::map<std::string, double>& stages_s, const std::string& prefix);
+/// Every stage of these runs, in the order in which a frame goes through them; waiting comes last.
+std::vector<std::string> StageOrder(const std::vector<Variant>& variants);
+/// Mean over the runs; one that has stages but not this one spent 0 s on it. No run has it: no value.
+MeanInterval StageOver(const Variant& variant, const std::string& stage);
+/// A row for each stage, a column for each variant [s].
+TextTable StageTable(const std::vector<Variant>& variants);
 
 }  // namespace tutti::cli

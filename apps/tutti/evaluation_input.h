@@ -1,13 +1,16 @@
 // What `tutti evaluate` and `tutti plot` have in common: a reference, estimates, and how they are compared.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
+
+namespace CLI {
+class App;
+}
 
 namespace tutti::cli {
 

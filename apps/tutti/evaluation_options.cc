@@ -1,8 +1,8 @@
 // The options that `tutti evaluate` and `tutti plot` share, with the names that users of evo know.
 #include <utility>
 
-#include "apps/tutti/checks.h"
 #include "apps/tutti/evaluation_input.h"
+#include "apps/tutti/options.h"
 
 namespace tutti::cli {
 namespace {
@@ -32,16 +32,13 @@ void AddFiles(CLI::App& command, EvaluationInput& input) {
                      "Folders of `tutti run`: the final trajectory, the poses as first given out and the "
                      "odometry without loops; the run's ground truth and alignment, if no other is given");
   command.add_option("--name", input.names, "Names of the estimates for the table, in their order");
-  command
-      .add_option("--format", input.format,
-                  "auto: by content; tum: 'stamp x y z qx qy qz qw'; kitti: 12 numbers a line; euroc: ASL "
-                  "csv; g2o: the vertices of a graph, in the order of their ids")
-      ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}))
-      ->capture_default_str();
-  command
-      .add_option("--reference-format", input.reference_format,
-                  "Of the reference, where it is not that of --format")
-      ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}));
+  const CLI::IsMember formats({"auto", "tum", "kitti", "euroc", "g2o"});
+  AddDefaulted(command, "--format", input.format,
+               "auto: by content; tum: 'stamp x y z qx qy qz qw'; kitti: 12 numbers a line; euroc: ASL csv; "
+               "g2o: the vertices of a graph, in the order of their ids",
+               formats);
+  AddOption(command, "--reference-format", input.reference_format,
+            "Of the reference, where it is not that of --format", formats);
   command.add_option("--times", input.times,
                      "KITTI's times.txt: the time stamps of files that have none (kitti, g2o)");
   command.add_option("--frames", input.frames,
@@ -51,12 +48,12 @@ void AddFiles(CLI::App& command, EvaluationInput& input) {
 
 void AddAlignment(CLI::App& command, EvaluationInput& input) {
   CLI::Option* align =
-      command
-          .add_option("--align", input.align,
-                      "How the estimate is laid on the reference: none; origin: first poses coincide; se3: "
-                      "best rigid fit; sim3: best fit with scale (mono); scale: the scale of sim3 alone; "
-                      "yaw: turn about --vertical and move")
-          ->check(CLI::IsMember(TrajectoryAlignmentNames()))
+      AddOption(
+          command, "--align", input.align,
+          "How the estimate is laid on the reference: none; origin: first poses coincide; se3: best rigid "
+          "fit; sim3: best fit with scale (mono); scale: the scale of sim3 alone; yaw: turn about "
+          "--vertical and move",
+          CLI::IsMember(TrajectoryAlignmentNames()))
           ->default_str("se3");
   CLI::Option* fit = command.add_flag("-a", input.fit, "As --align se3, with -s sim3")->excludes(align);
   CLI::Option* scale =
@@ -66,58 +63,37 @@ void AddAlignment(CLI::App& command, EvaluationInput& input) {
       ->excludes(align)
       ->excludes(fit)
       ->excludes(scale);
-  command
-      .add_option("--align-first,--n_to_align", input.options.align_first,
-                  "Align by so many associated poses from the start; 0: by all")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command.add_option("--vertical", input.vertical, "Axis of the reference that yaw turns about")
-      ->check(CLI::IsMember({"x", "y", "z"}))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--project-to-plane,--project_to_plane", input.plane,
-          "After the alignment, put all poses into this plane; their rotations keep the turn about its "
-          "normal")
-      ->check(CLI::IsMember(ProjectionPlaneNames()))
-      ->capture_default_str();
+  AddDefaulted(command, "--align-first,--n_to_align", input.options.align_first,
+               "Align by so many associated poses from the start; 0: by all", NotNegative());
+  AddDefaulted(command, "--vertical", input.vertical, "Axis of the reference that yaw turns about",
+               CLI::IsMember({"x", "y", "z"}));
+  AddDefaulted(command, "--project-to-plane,--project_to_plane", input.plane,
+               "After the alignment, put all poses into this plane; their rotations keep the turn about its "
+               "normal",
+               CLI::IsMember(ProjectionPlaneNames()));
 }
 
 void AddAssociation(CLI::App& command, EvaluationInput& input) {
-  command
-      .add_option("--downsample", input.options.downsample,
-                  "First, leave at most so many evenly spaced poses of each file; 0: all")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command
-      .add_option(
-          "--motion-filter,--motion_filter", input.motion_filter,
-          "Then leave a pose after so many metres of path, or degrees of turn, since the last [m deg]")
-      ->expected(2)
-      ->check(NotNegative());
-  command
-      .add_option("--max-diff,--t_max_diff", input.options.max_time_difference_s,
-                  "Largest time difference of a pair [s]")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command
-      .add_option("--time-offset,--t-offset,--t_offset", input.options.time_offset_s,
-                  "Added to the estimate's time stamps [s]")
-      ->capture_default_str();
+  AddDefaulted(command, "--downsample", input.options.downsample,
+               "First, leave at most so many evenly spaced poses of each file; 0: all", NotNegative());
+  AddOption(command, "--motion-filter,--motion_filter", input.motion_filter,
+            "Then leave a pose after so many metres of path, or degrees of turn, since the last [m deg]",
+            NotNegative())
+      ->expected(2);
+  AddDefaulted(command, "--max-diff,--t_max_diff", input.options.max_time_difference_s,
+               "Largest time difference of a pair [s]", NotNegative());
+  AddDefaulted(command, "--time-offset,--t-offset,--t_offset", input.options.time_offset_s,
+               "Added to the estimate's time stamps [s]");
   command.add_flag("--interpolate", input.options.interpolate,
                    "Compare with the reference interpolated at the estimate's stamps, not with its nearest "
                    "pose");
-  command
-      .add_option("--max-gap", input.options.max_interpolation_s,
-                  "Don't interpolate between poses further apart [s]")
-      ->check(Positive())
-      ->capture_default_str();
+  AddDefaulted(command, "--max-gap", input.options.max_interpolation_s,
+               "Don't interpolate between poses further apart [s]", Positive());
 }
 
 void AddRelative(CLI::App& command, EvaluationInput& input) {
-  command.add_option("-d,--rpe-delta,--delta", input.options.rpe_delta, "Distance of the relative errors")
-      ->check(Positive())
-      ->capture_default_str();
+  AddDefaulted(command, "-d,--rpe-delta,--delta", input.options.rpe_delta, "Distance of the relative errors",
+               Positive());
   command.add_option("-u,--rpe-unit,--delta_unit", input.rpe_unit, "Unit of --rpe-delta; or f, m, d, s, r")
       ->transform(WordOrShort(DeltaUnitNames(), {{"f", "frames"},
                                                  {"m", "metres"},
@@ -129,11 +105,8 @@ void AddRelative(CLI::App& command, EvaluationInput& input) {
       ->capture_default_str();
   command.add_flag("--rpe-all-pairs,--all-pairs,--all_pairs", input.options.rpe_all_pairs,
                    "Relative errors from every pose, overlapping");
-  command
-      .add_option("-t,--rpe-tolerance,--delta_tol", input.options.rpe_tolerance,
-                  "All pairs: allowed deviation from --rpe-delta, as a fraction of it")
-      ->check(NotNegative())
-      ->capture_default_str();
+  AddDefaulted(command, "-t,--rpe-tolerance,--delta_tol", input.options.rpe_tolerance,
+               "All pairs: allowed deviation from --rpe-delta, as a fraction of it", NotNegative());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <system_error>
 
 #include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 
@@ -41,9 +42,14 @@ void KeepInputs(const std::vector<std::string>& read, const std::vector<std::str
   }
 }
 
-void RequireWritable(const std::vector<std::string>& files) {
-  for (const std::string& file : files)
+void CheckFiles(const std::vector<std::string>& read, const std::vector<std::string>& written) {
+  KeepInputs(read, written);
+  for (const std::string& file : written)
     if (!file.empty()) internal::CheckWritable(file, internal::Needs::kBytes);
+}
+
+void SayWarnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) internal::Say("warning: %s", warning.c_str());
 }
 
 }  // namespace tutti::cli

@@ -27,8 +27,10 @@ nlohmann::ordered_json ReadJson(const std::filesystem::path& file, const std::st
 /// given.
 void KeepInputs(const std::vector<std::string>& read, const std::vector<std::string>& written);
 
-/// Throws InputError for a file that can't be written later, after long work (internal::CheckWritable). Empty
-/// names are of options that were not given.
-void RequireWritable(const std::vector<std::string>& files);
+/// KeepInputs; throws InputError also for a file that can't be written later, after long work.
+void CheckFiles(const std::vector<std::string>& read, const std::vector<std::string>& written);
+
+/// A line on standard error for each of the warnings.
+void SayWarnings(const std::vector<std::string>& warnings);
 
 }  // namespace tutti::cli

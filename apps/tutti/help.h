@@ -1,4 +1,4 @@
-// The text of --help, as wide as the terminal.
+// What the parser says of its options: --help, as wide as the terminal, and --describe.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -25,5 +25,10 @@ class WrappedHelp : public CLI::Formatter {
 
   std::size_t columns_;
 };
+
+/// Adds --describe, which no help shows: prints the parser's options and commands as JSON, and ends. The man
+/// page and the completion of shells are made of it (apps/manual). The parser must live as long as it is
+/// used.
+void AddDescribeFlag(CLI::App& parser);
 
 }  // namespace tutti::cli

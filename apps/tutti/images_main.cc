@@ -6,7 +6,6 @@
 #include <thread>
 
 #include "apps/tutti/commands.h"
-#include "apps/tutti/program.h"
 
 namespace {
 // Images are of one size: memory that one of them has left is kept for the next. To give it back to the
@@ -25,13 +24,18 @@ void KeepMemory() {
 
 int main(int argc, char** argv) {
   KeepMemory();
-  const std::map<std::string, tutti::cli::SetUp> own = {
-      {"run", tutti::cli::SetUpRun},           {"calibrate-check", tutti::cli::SetUpCalibrateCheck},
-      {"compare", tutti::cli::SetUpCompare},   {"loops", tutti::cli::SetUpLoops},
-      {"generate", tutti::cli::SetUpGenerate}, {"demo", tutti::cli::SetUpDemo},
-      {"map", tutti::cli::SetUpMap},           {"localize", tutti::cli::SetUpLocalize},
-      {"export", tutti::cli::SetUpExport},     {"merge", tutti::cli::SetUpMerge},
-      {"close", tutti::cli::SetUpClose},
-  };
-  return tutti::cli::RunProgram(argc, argv, own, nullptr);
+  using namespace tutti::cli;  // NOLINT(google-build-using-namespace)
+  return RunProgram(argc, argv,
+                    {{"run", SetUpRun},
+                     {"calibrate-check", SetUpCalibrateCheck},
+                     {"compare", SetUpCompare},
+                     {"loops", SetUpLoops},
+                     {"generate", SetUpGenerate},
+                     {"demo", SetUpDemo},
+                     {"map", SetUpMap},
+                     {"localize", SetUpLocalize},
+                     {"export", SetUpExport},
+                     {"merge", SetUpMerge},
+                     {"close", SetUpClose}},
+                    nullptr);
 }

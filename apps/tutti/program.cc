@@ -1,24 +1,35 @@
-#include "apps/tutti/program.h"
+#include <sys/types.h>
 
 #include <algorithm>
+#include <cctype>
+#include <cerrno>
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <new>
 #include <sstream>
+#include <streambuf>
+#include <string>
+#include <system_error>
 #include <vector>
 
-#include "apps/tutti/describe.h"
-#include "apps/tutti/exhausted.h"
-#include "apps/tutti/foreign_lines.h"
+#if defined(__GLIBC__) && defined(__GLIBCXX__)
+#define TUTTI_STDERR_CAN_BE_SET  // elsewhere stderr may not be assigned to
+#include <ext/stdio_sync_filebuf.h>
+#endif
+
+#include "apps/tutti/commands.h"
 #include "apps/tutti/help.h"
-#include "apps/tutti/number_checks.h"
+#include "apps/tutti/options.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/slam/version.h"
 
-// Of OpenMP, which comes with CHOLMOD; null without it.
+// OpenMP's, which comes with CHOLMOD; null without it.
 extern "C" __attribute__((weak)) void omp_set_max_active_levels(int levels);
 
 namespace tutti::cli {
@@ -97,6 +108,36 @@ std::string UnknownOption(const CLI::App& command, const std::vector<std::string
   return {};
 }
 
+// What ran out, where the system had no more, and what to lower; empty if `error` is of another kind.
+std::string WhatRanOut(const std::exception& error) {
+  int code = 0;
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  if (system != nullptr && (system->code().category() == std::system_category() ||
+                            system->code().category() == std::generic_category()))
+    code = system->code().value();
+  const std::string text = error.what();  // of OpenCV's exception, which this program does not link
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+      text.find("Insufficient memory") != std::string::npos ||
+      text.find("Failed to allocate") != std::string::npos)
+    code = ENOMEM;
+  switch (code) {
+    case ENOMEM:
+      return "there is not enough memory; give fewer --threads, smaller images or fewer frames, or raise the "
+             "limit (ulimit -v)";
+    case EAGAIN:
+      return "the system starts no more threads; give fewer --threads, or raise the limits (ulimit -u, "
+             "ulimit -v)";
+    case EMFILE:
+    case ENFILE:
+      return "no more files can be open at a time; give fewer --threads, or raise the limit (ulimit -n)";
+    case ENOSPC:
+    case EDQUOT:
+      return "the disk is full; free some space, or give a folder on another disk";
+    default:
+      return {};
+  }
+}
+
 // Prints what the library says: of --help, too.
 int Exit(const CLI::App& app, const CLI::ParseError& error) {
   std::ostringstream text;
@@ -105,9 +146,112 @@ int Exit(const CLI::App& app, const CLI::ParseError& error) {
   return status == 0 ? 0 : 1;
 }
 
+int Fail(const std::string& text) {
+  internal::Say("%s", text.c_str());
+  return 1;
+}
+
+constexpr std::size_t kMostAlike = 5, kMostKinds = 100, kMostLine = 1000;
+
+std::string WithoutNumbers(const std::string& line) {
+  std::string out;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (std::isdigit(static_cast<unsigned char>(line[i])) == 0) {
+      out += line[i];
+      continue;
+    }
+    while (i + 1 < line.size() && (std::isxdigit(static_cast<unsigned char>(line[i + 1])) != 0 ||
+                                   line[i + 1] == 'x' || line[i + 1] == '.'))
+      ++i;
+    out += '#';
+  }
+  return out;
+}
+
+// What libraries print on stderr: five lines of a kind, and how many more there were.
+// While it lives, stderr and std::cerr are its own, so that readers of images and videos, which print a line
+// for each damaged one, don't fill the screen. Lines that differ in their numbers alone are of one kind.
+// tutti's own messages go to internal::StandardError().
+class ForeignLines {
+ public:
+  // `quiet`: nothing of it is printed.
+  explicit ForeignLines(bool quiet);
+  ~ForeignLines();
+  ForeignLines(const ForeignLines&) = delete;
+  ForeignLines& operator=(const ForeignLines&) = delete;
+
+ private:
+  struct Kind {
+    std::string first;
+    std::size_t count = 0;
+  };
+  void Take(const char* text, std::size_t size);
+  void EndLine();
+
+  bool quiet_;
+  std::FILE* before_ = nullptr;  // stderr
+  std::FILE* stream_ = nullptr;  // in its stead; null where the C library has none of its kind
+  std::unique_ptr<std::streambuf> buffer_;
+  std::streambuf* cerr_ = nullptr;  // std::cerr's own
+  std::mutex mutex_;
+  std::string line_;                   // that has not ended; guarded by mutex_, as all below
+  std::map<std::string, Kind> kinds_;  // by their text without numbers
+};
+
+ForeignLines::ForeignLines(bool quiet) : quiet_(quiet) {
+  internal::StandardError();  // what it was before
+#ifdef TUTTI_STDERR_CAN_BE_SET
+  cookie_io_functions_t functions = {};
+  functions.write = [](void* self, const char* text, std::size_t size) {
+    static_cast<ForeignLines*>(self)->Take(text, size);
+    return static_cast<ssize_t>(size);
+  };
+  stream_ = fopencookie(this, "w", functions);
+  if (stream_ == nullptr) return;
+  std::setvbuf(stream_, nullptr, _IONBF, 0);
+  before_ = stderr;
+  stderr = stream_;
+  buffer_ = std::make_unique<__gnu_cxx::stdio_sync_filebuf<char>>(stream_);
+  cerr_ = std::cerr.rdbuf(buffer_.get());
+#endif
+}
+
+ForeignLines::~ForeignLines() {
+  if (stream_ == nullptr) return;
+  std::cerr.rdbuf(cerr_);
+#ifdef TUTTI_STDERR_CAN_BE_SET
+  stderr = before_;
+#endif
+  std::fclose(stream_);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!line_.empty()) EndLine();
+  for (const auto& [kind, lines] : kinds_) {
+    if (lines.count > kMostAlike && !quiet_)
+      internal::Say("%zu more lines of a library like '%s'", lines.count - kMostAlike, lines.first.c_str());
+  }
+}
+
+void ForeignLines::Take(const char* text, std::size_t size) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (std::size_t i = 0; i < size; ++i) {
+    if (text[i] == '\n' || line_.size() >= kMostLine) EndLine();
+    if (text[i] != '\n') line_ += text[i];
+  }
+}
+
+void ForeignLines::EndLine() {
+  std::string kind = WithoutNumbers(line_);
+  if (kinds_.size() >= kMostKinds && kinds_.count(kind) == 0) kind = "...";
+  Kind& lines = kinds_[kind];
+  if (lines.count == 0) lines.first = line_;
+  if (++lines.count <= kMostAlike && !quiet_)
+    std::fprintf(internal::StandardError(), "%s\n", internal::Printable(line_).c_str());
+  line_.clear();
+}
+
 }  // namespace
 
-int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, int (*other)(char** argv)) {
+int RunProgram(int argc, char** argv, const std::map<std::string, SetUp*>& own, int (*other)(char** argv)) {
   StartNoThreadsOfOpenMp();
   CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};
   app.formatter(std::make_shared<WrappedHelp>(internal::TerminalColumns(stdout)));
@@ -143,20 +287,14 @@ int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, i
   } catch (const CLI::ExtrasError& e) {
     const CLI::App& command = *app.get_subcommands().front();
     const std::string unknown = UnknownOption(command, command.remaining(true));
-    if (unknown.empty()) return Exit(app, e);
-    internal::Say("%s", unknown.c_str());
-    return 1;
+    return unknown.empty() ? Exit(app, e) : Fail(unknown);
   } catch (const CLI::ParseError& e) {
     return Exit(app, e);  // --help comes this way, too
   } catch (const InputError& e) {
-    internal::Say("%s", e.what());
-    return 1;
+    return Fail(e.what());
   } catch (const std::exception& e) {
     const std::string exhausted = WhatRanOut(e);
-    if (!exhausted.empty()) {
-      internal::Say("%s", exhausted.c_str());
-      return 1;
-    }
+    if (!exhausted.empty()) return Fail(exhausted);
     internal::Say("internal error: %s; please report it with the command line", e.what());
     return 2;
   }

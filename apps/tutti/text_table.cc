@@ -2,40 +2,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdarg>
 #include <cstdio>
+#include <string_view>
 
+#include "apps/tutti/options.h"
 #include "core/terminal.h"
-#include "tutti/core/error.h"
 
 namespace tutti::cli {
 namespace {
 
-std::string EscapedForLatex(const std::string& text) {
+constexpr std::string_view kPlusMinus = " +- ";
+
+std::string Escaped(const std::string& text, TableFormat format) {
+  const bool latex = format == TableFormat::kLatex;
   std::string out;
   for (const char c : text) {
-    switch (c) {
-      case '\\':
-        out += "\\textbackslash{}";
-        break;
-      case '~':
-      case '^':
-        out += std::string("\\") + c + "{}";
-        break;
-      case '_':
-      case '%':
-      case '&':
-      case '#':
-      case '$':
-      case '{':
-      case '}':
-        out += std::string("\\") + c;
-        break;
-      case '<':
-      case '>':
-        out += std::string("$") + c + "$";
-        break;
-      default:
-        out += c;
+    const auto in = [c](std::string_view characters) { return characters.find(c) != std::string_view::npos; };
+    if (latex && c == '\\') {
+      out += "\\textbackslash{}";
+    } else if (latex && in("~^")) {
+      out += std::string("\\") + c + "{}";
+    } else if (latex && in("<>")) {
+      out += std::string("$") + c + "$";
+    } else {
+      if (latex ? in("_%&#${}") : format == TableFormat::kMarkdown && c == '|') out += '\\';
+      out += c;
     }
   }
   return out;
@@ -43,16 +35,11 @@ std::string EscapedForLatex(const std::string& text) {
 
 /// "a +- b" with the sign of mathematics, for LaTeX.
 std::string WithPlusMinus(std::string text) {
-  const std::string plain = " +- ", math = " $\\pm$ ";
-  for (std::size_t at = text.find(plain); at != std::string::npos; at = text.find(plain, at + math.size()))
-    text.replace(at, plain.size(), math);
+  const std::string math = " $\\pm$ ";
+  for (std::size_t at = text.find(kPlusMinus); at != std::string::npos;
+       at = text.find(kPlusMinus, at + math.size()))
+    text.replace(at, kPlusMinus.size(), math);
   return text;
-}
-
-std::string EscapedForMarkdown(const std::string& text) {
-  std::string out;
-  for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
-  return out;
 }
 
 /// Characters, not bytes: labels hold UTF-8.
@@ -61,36 +48,16 @@ std::size_t Width(const std::string& text) {
       text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
 }
 
-std::string Padded(const std::string& text, std::size_t width, bool left) {
-  const std::string space(width - std::min(width, Width(text)), ' ');
-  return left ? text + space : space + text;
-}
-
-std::string Line(const std::vector<std::string>& cells, const std::vector<std::size_t>& widths,
-                 const char* begin, const char* between, const char* end) {
-  std::string line = begin;
-  for (std::size_t k = 0; k < cells.size(); ++k)
-    line += (k > 0 ? between : "") + Padded(cells[k], widths[k], k == 0);
-  return line + end + "\n";
-}
-
 std::string MarkdownRule(const std::vector<std::size_t>& widths) {
   std::string line = "|";
-  for (std::size_t k = 0; k < widths.size(); ++k) {
-    const std::string dashes(std::max<std::size_t>(widths[k], 3) + 1, '-');
-    line += k == 0 ? dashes + "-|" : dashes + ":|";
-  }
+  for (std::size_t k = 0; k < widths.size(); ++k)
+    line += std::string(widths[k] + 1, '-') + (k == 0 ? "-|" : ":|");
   return line + "\n";
 }
 
-constexpr const char* kPlusMinus = " +- ";
-
 std::string CsvCell(const std::string& text) {
   if (text == "-") return {};
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
+  return text.find_first_of(",\"\n") == std::string::npos ? text : Quoted(text);
 }
 
 std::string RenderCsv(const TextTable& table) {
@@ -105,8 +72,7 @@ std::string RenderCsv(const TextTable& table) {
       const std::size_t at = is_header ? std::string::npos : cells[k].find(kPlusMinus);
       out += (k > 0 ? "," : "") + CsvCell(cells[k].substr(0, at));
       if (!splits[k]) continue;
-      const std::string half =
-          at == std::string::npos ? "-" : cells[k].substr(at + std::string(kPlusMinus).size());
+      const std::string half = at == std::string::npos ? "-" : cells[k].substr(at + kPlusMinus.size());
       out += "," + CsvCell(is_header ? cells[k] + " +-" : half);
     }
     return out + "\n";
@@ -123,73 +89,74 @@ std::string Bold(const std::string& cell, TableFormat format) {
 
 }  // namespace
 
-void AddTableFormatOption(CLI::App& command, std::string& name) {
-  command
-      .add_option("--table-format", name,
-                  "How tables are printed; latex needs the package booktabs, csv is for other programs")
-      ->check(CLI::IsMember({"text", "markdown", "latex", "csv"}))
-      ->capture_default_str();
-}
-
-TableFormat ParseTableFormat(const std::string& name) {
-  if (name == "text") return TableFormat::kText;
-  if (name == "markdown") return TableFormat::kMarkdown;
-  if (name == "latex") return TableFormat::kLatex;
-  if (name == "csv") return TableFormat::kCsv;
-  throw InputError("unknown table format '" + name + "'; use text, markdown, latex or csv");
+void AddTableFormatOption(CLI::App& command, TableFormat& format) {
+  const EnumWords<TableFormat> words = {{"text", TableFormat::kText},
+                                        {"markdown", TableFormat::kMarkdown},
+                                        {"latex", TableFormat::kLatex},
+                                        {"csv", TableFormat::kCsv}};
+  AddWord(command, "--table-format", format,
+          "How tables are printed; latex needs the package booktabs, csv is for other programs", words,
+          CLI::IsMember({"text", "markdown", "latex", "csv"}))
+      ->default_str("text");
 }
 
 std::string Render(const TextTable& table, TableFormat format) {
   if (format == TableFormat::kCsv) return RenderCsv(table);
+  const bool latex = format == TableFormat::kLatex, markdown = format == TableFormat::kMarkdown;
   std::vector<std::vector<std::string>> lines = {table.header};
   lines.insert(lines.end(), table.rows.begin(), table.rows.end());
-  std::vector<std::size_t> widths(table.header.size(), 0);
   for (std::vector<std::string>& line : lines) {
-    for (std::size_t k = 0; k < line.size(); ++k) {
-      line[k] = internal::Printable(line[k]);
-      if (format == TableFormat::kLatex) line[k] = WithPlusMinus(EscapedForLatex(line[k]));
-      if (format == TableFormat::kMarkdown) line[k] = EscapedForMarkdown(line[k]);
+    for (std::string& cell : line) {
+      cell = Escaped(internal::Printable(cell), format);
+      if (latex) cell = WithPlusMinus(cell);
     }
   }
   for (const auto& [row, column] : table.bold) {
     std::string& cell = lines.at(row + 1).at(column);
     cell = Bold(cell, format);
   }
+  std::vector<std::size_t> widths(table.header.size(), markdown ? 3 : 0);
   for (const std::vector<std::string>& line : lines) {
     for (std::size_t k = 0; k < line.size(); ++k) widths.at(k) = std::max(widths[k], Width(line[k]));
   }
-  if (format == TableFormat::kMarkdown) {
-    for (std::size_t& width : widths) width = std::max<std::size_t>(width, 3);
-  }
+  const std::string begin = latex ? "" : markdown ? "| " : "  ";
+  const std::string between = latex ? " & " : markdown ? " | " : "  ";
+  const std::string end = latex ? " \\\\\n" : markdown ? " |\n" : "\n";
   std::string out;
-  if (format == TableFormat::kLatex)
-    out += "\\begin{tabular}{l" + std::string(widths.size() - 1, 'r') + "}\n\\toprule\n";
-  for (std::size_t k = 0; k < lines.size(); ++k) {
-    switch (format) {
-      case TableFormat::kText:
-        out += Line(lines[k], widths, "  ", "  ", "");
-        break;
-      case TableFormat::kMarkdown:
-        out += Line(lines[k], widths, "| ", " | ", " |");
-        if (k == 0) out += MarkdownRule(widths);
-        break;
-      case TableFormat::kLatex:
-        out += Line(lines[k], widths, "", " & ", " \\\\");
-        if (k == 0) out += "\\midrule\n";
-        break;
-      case TableFormat::kCsv:
-        break;
+  if (latex) out = "\\begin{tabular}{l" + std::string(widths.size() - 1, 'r') + "}\n\\toprule\n";
+  for (std::size_t row = 0; row < lines.size(); ++row) {
+    for (std::size_t k = 0; k < lines[row].size(); ++k) {
+      const std::string& cell = lines[row][k];
+      const std::string space(widths[k] - Width(cell), ' ');
+      out += k == 0 ? begin + cell + space : between + space + cell;
     }
+    out += end;
+    if (row == 0 && latex) out += "\\midrule\n";
+    if (row == 0 && markdown) out += MarkdownRule(widths);
   }
-  if (format == TableFormat::kLatex) out += "\\bottomrule\n\\end{tabular}\n";
+  if (latex) out += "\\bottomrule\n\\end{tabular}\n";
   return out;
 }
 
-std::string Fixed(double value, int decimals) {
-  if (!std::isfinite(value)) return "-";
-  char text[80];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+std::string Formatted(const char* format, ...) {
+  std::va_list arguments, again;
+  va_start(arguments, format);
+  va_copy(again, arguments);
+  std::string text(static_cast<std::size_t>(std::max(0, std::vsnprintf(nullptr, 0, format, arguments))), ' ');
+  std::vsnprintf(text.data(), text.size() + 1, format, again);
+  va_end(again);
+  va_end(arguments);
   return text;
+}
+
+std::string Fixed(double value, int decimals) {
+  return std::isfinite(value) ? Formatted("%.*f", decimals, value) : "-";
+}
+
+std::string Quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
 }
 
 }  // namespace tutti::cli

@@ -1,18 +1,19 @@
-// Tables for the terminal, for Markdown and for LaTeX.
+// Tables for the terminal, for Markdown and for LaTeX, and texts with numbers.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
+namespace CLI {
+class App;
+}
+
 namespace tutti::cli {
 
 enum class TableFormat { kText, kMarkdown, kLatex, kCsv };
-/// Adds --table-format to a command; `name` holds the word ("text", "markdown", "latex", "csv").
-void AddTableFormatOption(CLI::App& command, std::string& name);
-/// Throws InputError for another word.
-TableFormat ParseTableFormat(const std::string& name);
+/// Adds --table-format to a command.
+void AddTableFormatOption(CLI::App& command, TableFormat& format);
 
 /// A table of texts; every row has as many cells as the header. The first column is flush left, the others
 /// flush right.
@@ -27,7 +28,11 @@ struct TextTable {
 /// escaped. CSV: a column of "a +- b" becomes two; nothing is bold, and "-" is an empty cell.
 std::string Render(const TextTable& table, TableFormat format);
 
+/// As printf makes it.
+std::string Formatted(const char* format, ...) __attribute__((format(printf, 1, 2)));
 /// The value with so many decimals; "-" if it is not finite.
 std::string Fixed(double value, int decimals);
+/// A cell of a CSV file that may hold anything.
+std::string Quoted(const std::string& text);
 
 }  // namespace tutti::cli

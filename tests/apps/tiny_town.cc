@@ -1,9 +1,7 @@
 #include "tests/apps/tiny_town.h"
 
-#include <string>
-
-#include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
+#include "tests/support/test_data.h"
 
 namespace tutti::testing {
 namespace fs = std::filesystem;
@@ -30,6 +28,16 @@ fs::path TinyConfig(const fs::path& folder, const std::string& more) {
   fs::path file = folder / "tiny.yaml";
   WriteAll(file, "dataset: {type: kitti, sensor: stereo}\n" + more);
   return file;
+}
+
+TownTest::TownTest() : folder_(FreshFolder()), out_(folder_ / "out"), config_(TinyConfig(folder_)) {}
+
+ProcessResult TownTest::Run(const std::string& out, const std::vector<std::string>& more) const {
+  return RunTutti(RunArguments(config_, TinyTown(), folder_ / out, more));
+}
+
+nlohmann::json TownTest::Summary(const std::string& out) const {
+  return ReadJson(folder_ / out / "summary.json");
 }
 
 }  // namespace tutti::testing

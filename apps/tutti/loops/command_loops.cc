@@ -12,17 +12,13 @@
 
 #include "apps/run/interrupt.h"
 #include "apps/run/progress.h"
-#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/files.h"
 #include "apps/tutti/loops/earlier_images.h"
-#include "apps/tutti/loops/joined_pairs.h"
-#include "apps/tutti/loops/loops_dump.h"
 #include "apps/tutti/loops/loops_input.h"
 #include "apps/tutti/loops/loops_output.h"
-#include "apps/tutti/loops/loops_pictures.h"
-#include "apps/tutti/loops/loops_table.h"
 #include "apps/tutti/loops/overlap_truth.h"
-#include "apps/tutti/mask_option.h"
+#include "apps/tutti/recording_options.h"
 #include "core/camera_text.h"
 #include "core/stopwatch.h"
 #include "core/terminal.h"
@@ -80,11 +76,17 @@ LoopRow Process(const Input& set, std::size_t i, std::int64_t number, LoopDetect
   return row;
 }
 
+// Images that are joined have none of these in common.
+void RefuseForPairs(const LoopsArguments& arguments, const char* option, const char* what) {
+  if (!arguments.truth.join_pairs) return;
+  throw InputError(std::string(option) + ": images that --join-pairs joins have no common " + what +
+                   "; leave one of the two out");
+}
+
 // --mask, and a word about images that have none.
 std::optional<ImageMasks> MasksFor(const LoopsArguments& arguments, const ImageSet& set) {
   if (arguments.mask.empty()) return std::nullopt;
-  if (arguments.truth.join_pairs)
-    throw InputError("--mask: images that --join-pairs joins have no common mask; leave one of the two out");
+  RefuseForPairs(arguments, "--mask", "mask");
   ImageMasks masks(arguments.mask);
   if (set.recording) {
     const PinholeCamera& camera = set.recording->Rig().camera;
@@ -214,7 +216,8 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
   return 0;
 }
 
-void CheckGroundTruth(const GroundTruthArguments& truth) {
+void CheckGroundTruth(const LoopsArguments& arguments) {
+  const GroundTruthArguments& truth = arguments.truth;
   std::string problem = truth.rule.Validate();
   if (problem.empty() && truth.overlap)
     problem = internal::OverlapRule{*truth.overlap, truth.ignore_overlap, truth.rule.exclude_s}.Validate();
@@ -222,10 +225,7 @@ void CheckGroundTruth(const GroundTruthArguments& truth) {
   if (!truth.overlap) return;
   if (truth.file.empty())
     throw InputError("--ground-truth-overlap needs a pose for each image: give --ground-truth FILE of poses");
-  if (truth.join_pairs)
-    throw InputError(
-        "--ground-truth-overlap: images that --join-pairs joins have no common depth; leave one "
-        "of the two out");
+  RefuseForPairs(arguments, "--ground-truth-overlap", "depth");
 }
 
 int RunLoops(const LoopsArguments& given) {
@@ -234,11 +234,7 @@ int RunLoops(const LoopsArguments& given) {
   if (arguments.out.empty()) arguments.out = DefaultOutput(given.images, "-loops").string();
   if (arguments.table && arguments.truth.file.empty())
     throw InputError("--table compares rules by a ground truth; give --ground-truth");
-  if (arguments.truth.join_pairs && !arguments.camera.empty()) {
-    throw InputError(
-        "--camera: images that --join-pairs joins have no common camera; leave one of the two out");
-  }
-  if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
+  if (!arguments.camera.empty()) RefuseForPairs(arguments, "--camera", "camera");
   if (!arguments.preset.empty()) ApplyPreset(arguments.preset, arguments.options);
   if (!arguments.rule.empty()) SetRule(arguments.rule, arguments.options);
   SetLoopOptions(arguments.set, arguments.options);
@@ -249,9 +245,8 @@ int RunLoops(const LoopsArguments& given) {
                      "leave one of the two out");
   }
   OutputFolder::Check(arguments.out, LoopsLayout(arguments.table));
-  CheckGroundTruth(arguments.truth);
-  if (arguments.rgbd && arguments.truth.join_pairs)
-    throw InputError("--rgbd: images that --join-pairs joins have no common depth; leave one of the two out");
+  CheckGroundTruth(arguments);
+  if (arguments.rgbd) RefuseForPairs(arguments, "--rgbd", "depth");
   cv::setNumThreads(arguments.options.threads);
   std::optional<PinholeCamera> camera;
   if (!arguments.camera.empty()) camera = internal::ParseCamera(arguments.camera);
@@ -293,21 +288,17 @@ void AddOverlapOptions(CLI::App& command, LoopsArguments& a) {
               "trajectory, and depth images: a loop is two images, at least this share of one of which is "
               "seen in the other (0.3 is usual), in place of --gt-distance and --gt-angle")
           ->type_name("SHARE");
-  command
-      .add_option("--gt-ignore-overlap", a.truth.ignore_overlap,
-                  "by overlap: no loop where less than this is shared, either way; between the two: ignored")
+  AddDefaulted(command, "--gt-ignore-overlap", a.truth.ignore_overlap,
+               "by overlap: no loop where less than this is shared, either way; between the two: ignored")
       ->type_name("SHARE")
-      ->needs(overlap)
-      ->capture_default_str();
+      ->needs(overlap);
   command
       .add_option("--gt-depth", a.truth.depth.dataset,
                   "data set (RGB-D: TUM's and other layouts) that has the images' depth (default: the one "
                   "that they are part of)")
       ->type_name("DATASET");
-  command
-      .add_option("--gt-depth-units", a.truth.depth.units_per_m,
-                  "value of one metre in its depth images (default: as its layout says)")
-      ->check(Positive());
+  AddOption(command, "--gt-depth-units", a.truth.depth.units_per_m,
+            "value of one metre in its depth images (default: as its layout says)", Positive());
   command.add_option("--gt-camera", a.depth_camera,
                      std::string(internal::kCameraText) +
                          " [px]: of those images (default: --camera, else as the data set says)");
@@ -332,9 +323,7 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
   command.add_option("--out", arguments->out,
                      "folder for loops.csv, results.json, hypotheses.csv, curves and pictures (default: "
                      "tutti-out/NAME-loops)");
-  command.add_option("--stride", arguments->truth.stride, "every n-th image")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  AddDefaulted(command, "--stride", arguments->truth.stride, "every n-th image", CLI::Range(1, 1000000));
   command.add_flag("--join-pairs", arguments->truth.join_pairs,
                    "two images in a row, left and right, make one image (City Centre, New College)");
   command.add_flag("--keep-posterior", arguments->options.keep_posterior,
@@ -351,16 +340,12 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
   command.add_option("--preset", arguments->preset,
                      "published parameters: standardised-mean, paper-2013, rtabmap-0.8.3, or default (ours)");
   LoopRule& rule = arguments->truth.rule;
-  command.add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
-      ->capture_default_str();
-  command.add_option("--gt-angle", rule.angle_deg, "trajectory: and turned by less than this [deg]")
-      ->capture_default_str();
-  command
-      .add_option("--gt-ignore", rule.ignore_m,
-                  "trajectory: what is nearer than this but no loop is ignored [m]")
-      ->capture_default_str();
-  command.add_option("--gt-exclude-s", rule.exclude_s, "trajectory: a loop is at least this much older [s]")
-      ->capture_default_str();
+  AddDefaulted(command, "--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]");
+  AddDefaulted(command, "--gt-angle", rule.angle_deg, "trajectory: and turned by less than this [deg]");
+  AddDefaulted(command, "--gt-ignore", rule.ignore_m,
+               "trajectory: what is nearer than this but no loop is ignored [m]");
+  AddDefaulted(command, "--gt-exclude-s", rule.exclude_s,
+               "trajectory: a loop is at least this much older [s]");
   AddOverlapOptions(command, *arguments);
   command
       .add_flag("--table", arguments->table,
@@ -371,14 +356,9 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
                      std::string(internal::kCameraText) +
                          " [px]: verify with the essential matrix (default: fundamental matrix)");
   AddMaskOption(command, arguments->mask);
-  command
-      .add_option("--threads", arguments->options.threads,
-                  "most threads; the result is the same for any number")
-      ->check(Positive())
-      ->capture_default_str();
-  command.add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
-      ->check(NotNegative())
-      ->capture_default_str();
+  AddDefaulted(command, "--threads", arguments->options.threads,
+               "most threads; the result is the same for any number", Positive());
+  AddDefaulted(command, "--seed", arguments->options.seed, "seed of kd-forests and RANSAC", NotNegative());
   command.add_option("--set", arguments->set,
                      "key=value: an option of the detector, with the keys of section 'loops' in tutti run "
                      "--help-config --advanced (extraction.features=300); may be given again");

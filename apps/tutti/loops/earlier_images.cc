@@ -1,9 +1,9 @@
 #include "apps/tutti/loops/earlier_images.h"
 
-#include <cstdio>
 #include <utility>
 #include <vector>
 
+#include "apps/tutti/text_table.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -102,11 +102,9 @@ std::string EarlierLoopsCsv(const LoopRun& run) {
   std::string text = "image,file,earlier_image,earlier_file,probability,inliers\n";
   for (const LoopRow& row : run.rows) {
     if (!row.earlier) continue;
-    char numbers[64];
-    std::snprintf(numbers, sizeof numbers, ",%.9g,%d\n", row.result.probability,
-                  row.result.verification.inliers);
     text += std::to_string(run.Number(row.result.query)) + "," + Quoted(row.file) + "," +
-            std::to_string(row.earlier->image) + "," + Quoted(row.earlier->file) + numbers;
+            std::to_string(row.earlier->image) + "," + Quoted(row.earlier->file) +
+            Formatted(",%.9g,%d\n", row.result.probability, row.result.verification.inliers);
   }
   return text;
 }

@@ -1,12 +1,11 @@
 // The confusion picture of `tutti loops`: who was taken for whom.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "apps/plot/plot_picture.h"
-#include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/text_table.h"
 
 namespace tutti::cli {
 namespace {
@@ -182,31 +181,26 @@ class Legend {
   std::vector<PlotShape>& shapes_;
 };
 
-std::string Hex(const cv::Vec3b& bgr) {
-  char text[8];
-  std::snprintf(text, sizeof text, "#%02x%02x%02x", bgr[2], bgr[1], bgr[0]);
-  return text;
-}
-
-std::string Counted(const char* text, long count) {
-  return std::string(text) + " (" + std::to_string(count) + ")";
-}
+std::string Hex(const cv::Vec3b& bgr) { return Formatted("#%02x%02x%02x", bgr[2], bgr[1], bgr[0]); }
 
 void AddOutcomeLegend(const LoopRun& run, const LoopReport& report, const PlotAxes& axes,
                       std::vector<PlotShape>& shapes) {
   const std::vector<LoopOutcome>& outcomes = report.verified.outcomes;
-  const auto count = [&](LoopOutcome outcome) {
-    return static_cast<long>(std::count(outcomes.begin(), outcomes.end(), outcome));
-  };
   long rejected = 0;
   for (std::size_t i = 0; i < outcomes.size(); ++i)
     rejected += outcomes[i] == LoopOutcome::kNothing && run.rows[i].result.proposed ? 1 : 0;
   Legend legend(axes, shapes);
-  legend.Marked(Mark::kTrue, Counted("true", count(LoopOutcome::kTruePositive)));
-  legend.Marked(Mark::kFalse, Counted("false", count(LoopOutcome::kFalsePositive)));
-  legend.Marked(Mark::kMissed, Counted("missed, at its true place", count(LoopOutcome::kMissed)));
-  legend.Marked(Mark::kIgnored, Counted("on an ignored pair", count(LoopOutcome::kIgnored)));
-  legend.Marked(Mark::kRejected, Counted("proposed, rightly rejected", rejected));
+  const auto counted = [&](Mark mark, const char* text, long count) {
+    legend.Marked(mark, Formatted("%s (%ld)", text, count));
+  };
+  const auto all = [&](LoopOutcome outcome) {
+    return static_cast<long>(std::count(outcomes.begin(), outcomes.end(), outcome));
+  };
+  counted(Mark::kTrue, "true", all(LoopOutcome::kTruePositive));
+  counted(Mark::kFalse, "false", all(LoopOutcome::kFalsePositive));
+  counted(Mark::kMissed, "missed, at its true place", all(LoopOutcome::kMissed));
+  counted(Mark::kIgnored, "on an ignored pair", all(LoopOutcome::kIgnored));
+  counted(Mark::kRejected, "proposed, rightly rejected", rejected);
   legend.Box("#bfdcee", "ground truth: same place");
   legend.Box("#e4e4e4", "ignored");
 }
@@ -249,16 +243,12 @@ void WriteConfusion(const LoopRun& run, const LoopReport& report, const std::fil
     PaintPosterior(run.posterior, panel(axes));
     AddAxes(axes, shapes);
     Legend legend(axes, shapes);
-    for (const double p : {1.0, 0.5, 0.25, 0.1, 0.01, 0.0}) {
-      char text[16];
-      std::snprintf(text, sizeof text, "%g", p);
-      legend.Box(Hex(PosteriorColor(p)), text);
-    }
+    for (const double p : {1.0, 0.5, 0.25, 0.1, 0.01, 0.0})
+      legend.Box(Hex(PosteriorColor(p)), Formatted("%g", p));
   }
 
-  char title[64];
-  std::snprintf(title, sizeof title, "what was said, at probability >= %g", run.options.loop_threshold);
-  const PlotAxes axes = PanelAxes(number, images, title);
+  const PlotAxes axes =
+      PanelAxes(number, images, Formatted("what was said, at probability >= %g", run.options.loop_threshold));
   PaintTruth(run.truth, "#bfdcee", "#e4e4e4", panel(axes));
   AddAxes(axes, shapes);
   AddMarks(run, report, axes, shapes);

@@ -1,7 +1,6 @@
 // The contact sheet of `tutti loops`: what went wrong, to look at.
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -9,7 +8,8 @@
 #include <vector>
 
 #include "apps/plot/plot_picture.h"
-#include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/text_table.h"
 #include "tutti/loopclosure/features.h"
 
 namespace tutti::cli {
@@ -39,7 +39,6 @@ std::vector<std::size_t> RowsOf(const LoopReport& report, LoopOutcome outcome) {
 std::vector<std::size_t> Spread(const std::vector<std::size_t>& rows, std::size_t count) {
   if (rows.size() <= count) return rows;
   std::vector<std::size_t> chosen;
-  chosen.reserve(count);
   for (std::size_t k = 0; k < count; ++k) chosen.push_back(rows[k * rows.size() / count]);
   return chosen;
 }
@@ -54,7 +53,6 @@ std::vector<Entry> Choose(std::vector<std::size_t> wrong, const std::vector<std:
       std::min(wrong.size(), std::max(half, kMostRows - std::min(kMostRows, missed.size())));
   wrong.resize(wrong_count);
   std::vector<Entry> entries;
-  entries.reserve(kMostRows);
   for (const std::size_t row : wrong) entries.push_back({row, false});
   for (const std::size_t row : Spread(missed, kMostRows - wrong_count)) entries.push_back({row, true});
   return entries;
@@ -123,14 +121,11 @@ std::string TruthText(const LoopRun& run, const TruthOfRow& truth) {
 }
 
 std::string Numbers(const LoopRun& run, const LoopResult& r) {
-  char text[200];
-  std::snprintf(text, sizeof text, "H = %.3f, posterior of the best %.3f, probability %.3f", r.hypothesis,
-                r.posterior, r.probability);
-  const std::string line = text;
+  const std::string line = Formatted("H = %.3f, posterior of the best %.3f, probability %.3f", r.hypothesis,
+                                     r.posterior, r.probability);
   if (r.verification.candidate < 0) return line + ", nothing was verified";
-  std::snprintf(text, sizeof text, "; %d inliers of %d matches with image %ld", r.verification.inliers,
-                r.verification.matches, run.Number(r.verification.candidate));
-  return line + text;
+  return line + Formatted("; %d inliers of %d matches with image %ld", r.verification.inliers,
+                          r.verification.matches, run.Number(r.verification.candidate));
 }
 
 // As much of a text as fits.
@@ -172,10 +167,8 @@ struct Shown {
 Shown ShownBy(const LoopRun& run, const Entry& entry) {
   const LoopRow& row = run.rows[entry.row];
   const int image = static_cast<int>(row.result.query);
-  Shown shown;
-  shown.truth = LookUp(run.truth, image, row.Said());
-  shown.images = {image, row.Said(), shown.truth.shown};
-  return shown;
+  const TruthOfRow truth = LookUp(run.truth, image, row.Said());
+  return {truth, {image, row.Said(), truth.shown}};
 }
 
 using Thumbs = std::map<long, cv::Mat>;
@@ -235,10 +228,8 @@ void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::
   const int height = kHeader + std::max(1, static_cast<int>(entries.size())) * strip;
   cv::Mat picture(height, kWidth, CV_8UC3, cv::Scalar::all(255));
 
-  char text[200];
-  std::snprintf(text, sizeof text, "false positives: %zu, missed loops: %zu, at probability >= %g",
-                wrong.size(), missed.size(), run.options.loop_threshold);
-  std::string summary = text;
+  std::string summary = Formatted("false positives: %zu, missed loops: %zu, at probability >= %g",
+                                  wrong.size(), missed.size(), run.options.loop_threshold);
   if (!run.judged) {
     summary = std::to_string(entries.size()) + " of the accepted loops, evenly; all are in loops.csv";
   } else if (entries.size() < wrong.size() + missed.size())

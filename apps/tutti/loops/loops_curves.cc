@@ -1,26 +1,18 @@
 // Precision-recall curves of `tutti loops`.
-#include <cstdio>
 #include <utility>
 
 #include "apps/plot/plot.h"
-#include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/text_table.h"
 #include "core/replaced_file.h"
 
 namespace tutti::cli {
 namespace {
 
-std::string Percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f %%", 100 * share);
-  return text;
-}
-
 void AppendCsv(const char* name, const LoopEvaluation& evaluation, std::string& csv) {
   for (const PrecisionRecall& p : evaluation.curve) {
-    char line[160];
-    std::snprintf(line, sizeof line, "%s,%.9g,%d,%.9g,%.9g,%d,%d\n", name, p.threshold, p.rejected ? 1 : 0,
-                  p.precision, p.recall, p.true_positives, p.false_positives);
-    csv += line;
+    csv += Formatted("%s,%.9g,%d,%.9g,%.9g,%d,%d\n", name, p.threshold, p.rejected ? 1 : 0, p.precision,
+                     p.recall, p.true_positives, p.false_positives);
   }
 }
 
@@ -36,20 +28,16 @@ PlotCurve Curve(const char* name, const LoopEvaluation& evaluation) {
   if (evaluation.true_positives + evaluation.false_positives > 0)
     curve.marks.emplace_back(evaluation.at_default_threshold.recall,
                              evaluation.at_default_threshold.precision);
-  char area[32];
-  std::snprintf(area, sizeof area, "%.3f", evaluation.area_under_curve);
-  curve.name = std::string(name) + ": recall " + Percent(evaluation.recall_at_100_precision) +
-               " at 100 % precision, area " + area;
+  curve.name = Formatted("%s: recall %.1f %% at 100 %% precision, area %.3f", name,
+                         100 * evaluation.recall_at_100_precision, evaluation.area_under_curve);
   return curve;
 }
 
 void AppendRecallCsv(const char* decision, const char* over, const std::vector<RecallPart>& parts,
                      std::string& csv) {
   for (const RecallPart& p : parts) {
-    char line[160];
-    std::snprintf(line, sizeof line, "%s,%s,%.9g,%.9g,%d,%d,%d\n", decision, over, p.from, p.to, p.rows,
-                  p.found, p.found_at_100_precision);
-    csv += line;
+    csv += Formatted("%s,%s,%.9g,%.9g,%d,%d,%d\n", decision, over, p.from, p.to, p.rows, p.found,
+                     p.found_at_100_precision);
   }
 }
 
@@ -103,10 +91,8 @@ CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report) {
   ranked.color = PlotPalette(2);
   ranked.marks.clear();  // the decision is that of the verified ones
   plot.curves = {verified, ranked, posterior};
-  char note[120];
-  std::snprintf(note, sizeof note, "disc: at the default, probability >= %g (posterior only: H >= %g)",
-                run.options.loop_threshold, run.options.propose_threshold);
-  plot.notes.push_back(note);
+  plot.notes.push_back(Formatted("disc: at the default, probability >= %g (posterior only: H >= %g)",
+                                 run.options.loop_threshold, run.options.propose_threshold));
   if (report.verified.rows_with_loop == 0)
     plot.notes.push_back("the ground truth has no loop: recall is 0 by definition");
   if (report.ranked.curve.empty() && report.posterior.curve.empty())
@@ -141,9 +127,7 @@ CurvePlot PlotRecallByView(const LoopRun& run, const LoopReport& report) {
   std::string angles = "accepted, by the angle to that view:";
   for (const RecallPart& part : report.verified.recall_by_angle) {
     if (part.rows == 0) continue;
-    char text[96];
-    std::snprintf(text, sizeof text, " %g to %g deg: %d of %d;", part.from, part.to, part.found, part.rows);
-    angles += text;
+    angles += Formatted(" %g to %g deg: %d of %d;", part.from, part.to, part.found, part.rows);
   }
   plot.notes.push_back(angles.substr(0, angles.size() - 1));
   return plot;

@@ -1,10 +1,9 @@
-#include "apps/tutti/loops/loops_dump.h"
-
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 
 #include "apps/tutti/files.h"
+#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/text_table.h"
 
 namespace tutti::cli {
 namespace {
@@ -14,10 +13,8 @@ std::string CandidateLines(const LoopRun& run, const LoopResult& result, const L
   for (std::size_t i = 0; i < result.posterior_by_location.size(); ++i) {
     const auto& [location, combined] = result.posterior_by_location[i];
     const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(location));
-    char cells[128];
-    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%.9g", run.Number(result.query), run.Number(location),
-                  LabelName(label), combined);
-    std::string line = cells;
+    std::string line = Formatted("%ld,%ld,%s,%.9g", run.Number(result.query), run.Number(location),
+                                 LabelName(label), combined);
     bool any_score = false;
     for (const MemberOpinion& member : result.members) {
       if (i >= member.evidence.size()) {  // it sat this image out
@@ -26,9 +23,7 @@ std::string CandidateLines(const LoopRun& run, const LoopResult& result, const L
       }
       const CandidateEvidence& evidence = member.evidence[i];
       any_score = any_score || evidence.score > 0;
-      std::snprintf(cells, sizeof cells, ",%.9g,%.9g,%.9g", evidence.score, evidence.likelihood,
-                    evidence.posterior);
-      line += cells;
+      line += Formatted(",%.9g,%.9g,%.9g", evidence.score, evidence.likelihood, evidence.posterior);
     }
     if (any_score) text += line + "\n";
   }
@@ -38,29 +33,46 @@ std::string CandidateLines(const LoopRun& run, const LoopResult& result, const L
 std::string VerificationLine(const LoopRun& run, const LoopResult& result, const Verification& tried,
                              int order, bool late, const LoopGroundTruth& truth) {
   const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(tried.candidate));
-  char cells[400];
-  std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,%.9g,",
-                run.Number(result.query), run.Number(tried.candidate), LabelName(label), order, late ? 1 : 0,
-                tried.similar ? 1 : 0, tried.accepted ? 1 : 0,
-                result.accepted && tried.candidate == result.candidate ? 1 : 0, ToString(tried.type),
-                tried.matches, tried.inliers, tried.mass, tried.coverage, tried.expected_inliers,
-                tried.log_nfa, tried.motion_spread, result.hypothesis);
-  return cells + Quoted(tried.reason) + "\n";
+  return Formatted("%ld,%ld,%s,%d,%d,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,%.9g,",
+                   run.Number(result.query), run.Number(tried.candidate), LabelName(label), order,
+                   late ? 1 : 0, tried.similar ? 1 : 0, tried.accepted ? 1 : 0,
+                   result.accepted && tried.candidate == result.candidate ? 1 : 0, ToString(tried.type),
+                   tried.matches, tried.inliers, tried.mass, tried.coverage, tried.expected_inliers,
+                   tried.log_nfa, tried.motion_spread, result.hypothesis) +
+         Quoted(tried.reason) + "\n";
+}
+
+// A line for every location that is a loop, or that somebody believes in a little.
+std::string PosteriorLines(const LoopRow& row, const LoopRun& run) {
+  constexpr double kWorthALine = 1e-4;
+  const LoopResult& r = row.result;
+  std::string text;
+  for (std::size_t i = 0; i < r.posterior_by_location.size(); ++i) {
+    const auto& [location, combined] = r.posterior_by_location[i];
+    double most = combined;
+    const LoopLabel label = run.truth.At(static_cast<int>(r.query), static_cast<int>(location));
+    std::string line = Formatted("%ld,%ld,%d,%.6g", run.Number(r.query), run.Number(location),
+                                 static_cast<int>(label), combined);
+    for (const MemberOpinion& member : r.members) {
+      // A member that sat this image out has no posterior of it.
+      const auto& posterior = member.posterior_by_location;
+      const double value = i < posterior.size() ? posterior[i].second : 0.0;
+      most = std::max(most, value);
+      line += Formatted(",%.6g", value);
+    }
+    if (most >= kWorthALine || label == LoopLabel::kLoop) text += line + "\n";
+  }
+  return text;
 }
 
 void CheckWritten(const std::ofstream& out, const internal::ReplacedFile& file) {
   if (!out) internal::FailToWrite(file.target().string(), errno);
 }
 
-const std::filesystem::path& Made(const std::filesystem::path& folder) {
-  MakeFolder(folder);
-  return folder;
-}
-
 }  // namespace
 
 LoopsDump::LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members)
-    : candidates_file_(Made(folder) / "dump_candidates.csv"),
+    : candidates_file_((MakeFolder(folder), folder / "dump_candidates.csv")),
       verification_file_(folder / "dump_verification.csv") {
   candidates_.open(candidates_file_.part(), std::ios::binary);
   verification_.open(verification_file_.part(), std::ios::binary);
@@ -95,6 +107,14 @@ void LoopsDump::Finish() {
   CheckWritten(verification_, verification_file_);
   candidates_file_.Commit();
   verification_file_.Commit();
+}
+
+void WritePosteriors(const LoopRun& run, const std::filesystem::path& file) {
+  std::string text = "image,location,truth,combined";
+  for (const std::string& name : run.options.members) text += "," + name;
+  text += "\n";
+  for (const LoopRow& row : run.rows) text += PosteriorLines(row, run);
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti::cli

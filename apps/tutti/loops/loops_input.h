@@ -28,6 +28,17 @@ std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folde
 /// The same of a folder that may hold none.
 std::vector<std::filesystem::path> ImagesIn(const std::filesystem::path& folder);
 
+/// Left and right images that are joined side by side, as the City Centre and New College sets are used.
+/// `images` = left, right, left, right...: keeps the left ones in it and returns the right ones. Throws
+/// InputError that names `folder` if their number is odd.
+std::vector<std::filesystem::path> TakeRightImages(const std::string& folder,
+                                                   std::vector<std::filesystem::path>& images);
+
+/// Both images as they are in their files, left beside right; the lower one gets a black border below. Empty
+/// if one of them can't be read or their types differ. `cameras`: where left and right are in it.
+cv::Mat ReadJoined(const std::filesystem::path& left, const std::filesystem::path& right,
+                   std::vector<cv::Rect>* cameras = nullptr);
+
 /// Where the depth of images is.
 struct DepthArguments {
   std::string dataset;     ///< a data set with depth; empty: the one that the images belong to

@@ -3,17 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <functional>
-#include <set>
 #include <utility>
 
+#include "apps/tutti/files.h"
 #include "apps/tutti/loops/earlier_images.h"
-#include "apps/tutti/loops/loops_pictures.h"
-#include "apps/tutti/posteriors_csv.h"
+#include "apps/tutti/text_table.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
-#include "tutti/core/error.h"
+#include "tutti/core/text.h"
 
 namespace tutti::cli {
 namespace {
@@ -58,11 +56,10 @@ nlohmann::ordered_json CalibrationError(const LoopEvaluation& evaluation) {
   return evaluation.calibration_error;
 }
 
+std::string Percent(double share) { return Formatted("%.1f%%", 100 * share); }
+
 std::string CalibrationText(const LoopEvaluation& evaluation) {
-  if (evaluation.calibration_images == 0) return "-";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f%%", 100 * evaluation.calibration_error);
-  return text;
+  return evaluation.calibration_images == 0 ? "-" : Percent(evaluation.calibration_error);
 }
 
 nlohmann::ordered_json Reliability(const LoopEvaluation& evaluation) {
@@ -96,15 +93,12 @@ std::ptrdiff_t CountSecondWords(const LoopRun& run, SecondWord word) {
                        [word](const LoopRow& row) { return row.second_word == word; });
 }
 
-std::ptrdiff_t EarlierLoops(const LoopRun& run) {
-  return std::count_if(run.rows.begin(), run.rows.end(),
-                       [](const LoopRow& row) { return row.earlier.has_value(); });
+std::ptrdiff_t Count(const LoopRun& run, bool (*is)(const LoopRow&)) {
+  return std::count_if(run.rows.begin(), run.rows.end(), is);
 }
-
-std::ptrdiff_t AcceptedLoops(const LoopRun& run) {
-  return std::count_if(run.rows.begin(), run.rows.end(),
-                       [](const LoopRow& row) { return row.result.accepted; });
-}
+bool IsEarlier(const LoopRow& row) { return row.earlier.has_value(); }
+bool IsAccepted(const LoopRow& row) { return row.result.accepted; }
+bool IsDamaged(const LoopRow& row) { return !row.read; }
 
 std::string Csv(const LoopRun& run) {
   std::string text =
@@ -120,22 +114,36 @@ std::string Csv(const LoopRun& run) {
     const int image = static_cast<int>(r.query);
     const long verified = r.accepted ? run.Number(r.candidate) : -1;
     const long location = row.Said();
-    char numbers[256];
-    std::snprintf(
-        numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
-        run.Number(r.best), r.posterior, r.probability, r.proposed ? 1 : 0, r.accepted ? 1 : 0, verified,
-        r.verification.matches, r.verification.inliers,
-        location < 0 || !run.judged ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
-        run.truth.HasLoop(image) ? 1 : 0);
-    text += std::to_string(run.Number(image)) + "," + Quoted(row.file) + numbers;
+    text +=
+        std::to_string(run.Number(image)) + "," + Quoted(row.file) +
+        Formatted(
+            ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis, run.Number(r.best), r.posterior,
+            r.probability, r.proposed ? 1 : 0, r.accepted ? 1 : 0, verified, r.verification.matches,
+            r.verification.inliers,
+            location < 0 || !run.judged ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
+            run.truth.HasLoop(image) ? 1 : 0);
     for (std::size_t k = 0; k < run.options.members.size(); ++k) {
       const MemberOpinion opinion = k < r.members.size() ? r.members[k] : MemberOpinion();
-      std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g", opinion.hypothesis, run.Number(opinion.best),
-                    opinion.at_candidate);
-      text += numbers;
+      text += Formatted(",%.9g,%ld,%.9g", opinion.hypothesis, run.Number(opinion.best), opinion.at_candidate);
     }
     text += std::string(",") + SecondWordName(row.second_word);
     text += "," + Quoted(row.read ? r.reason : "the image can't be read") + "\n";
+  }
+  return text;
+}
+
+// The loops that were accepted, one a line: both images with their files, probability, inliers.
+std::string FoundLoopsCsv(const LoopRun& run) {
+  std::string text = "image,loop_with,probability,inliers,matches,late,file,loop_with_file\n";
+  for (const LoopRow& row : run.rows) {
+    const LoopResult& r = row.result;
+    if (!r.accepted) continue;
+    const auto candidate = static_cast<std::size_t>(r.candidate);
+    const std::string other = candidate < run.rows.size() ? run.rows[candidate].file : "";
+    text += Formatted("%ld,%ld,%.9g,%d,%d,%d,", run.Number(r.query), run.Number(r.candidate), r.probability,
+                      r.verification.inliers, r.verification.matches,
+                      row.second_word == SecondWord::kAccepted ? 1 : 0) +
+            Quoted(row.file) + "," + Quoted(other) + "\n";
   }
   return text;
 }
@@ -144,7 +152,7 @@ std::string Csv(const LoopRun& run) {
 nlohmann::ordered_json FoundJson(const LoopRun& run, const LoopReport& report) {
   return {{"images", run.rows.size()},
           {"images_damaged", report.damaged},
-          {"accepted", AcceptedLoops(run)},
+          {"accepted", Count(run, IsAccepted)},
           {"threshold", run.options.loop_threshold},
           {"ms_per_image", {{"median", report.ms_median}, {"p99", report.ms_p99}}},
           {"stage_ms_median", Stages(run.rows)}};
@@ -153,7 +161,7 @@ nlohmann::ordered_json FoundJson(const LoopRun& run, const LoopReport& report) {
 void PrintFound(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
   std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
   std::printf("%-34s %zu, %d of them damaged\n", "images", run.rows.size(), report.damaged);
-  std::printf("%-34s %td, at a probability of %g or more\n", "loops accepted", AcceptedLoops(run),
+  std::printf("%-34s %td, at a probability of %g or more\n", "loops accepted", Count(run, IsAccepted),
               run.options.loop_threshold);
   std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);
   std::printf("written: %s, contact_sheet.png (look at it), hypotheses.csv, results.json, confusion.png\n",
@@ -169,15 +177,13 @@ void PrintRecall(const std::string& name, const RecallPart& verified, const Reca
 // "recall, overlap >= 0.5", "recall, turned by 10 to 20 deg".
 void PrintRecallByView(const LoopReport& report) {
   const LoopEvaluation &v = report.verified, &p = report.posterior;
-  char name[64];
   for (std::size_t k = 0; k < v.recall_by_overlap.size(); ++k) {
-    std::snprintf(name, sizeof name, "recall, overlap >= %g", v.recall_by_overlap[k].from);
-    PrintRecall(name, v.recall_by_overlap[k], p.recall_by_overlap[k]);
+    PrintRecall(Formatted("recall, overlap >= %g", v.recall_by_overlap[k].from), v.recall_by_overlap[k],
+                p.recall_by_overlap[k]);
   }
   for (std::size_t k = 0; k < v.recall_by_angle.size(); ++k) {
     const RecallPart& part = v.recall_by_angle[k];
-    std::snprintf(name, sizeof name, "recall, turned by %g to %g deg", part.from, part.to);
-    PrintRecall(name, part, p.recall_by_angle[k]);
+    PrintRecall(Formatted("recall, turned by %g to %g deg", part.from, part.to), part, p.recall_by_angle[k]);
   }
 }
 
@@ -191,28 +197,6 @@ const char* SecondWordName(SecondWord word) {
   return word == SecondWord::kAccepted ? "accepted" : word == SecondWord::kWithdrawn ? "withdrawn" : "";
 }
 
-std::string Quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
-  return result + "\"";
-}
-
-std::string FoundLoopsCsv(const LoopRun& run) {
-  std::string text = "image,loop_with,probability,inliers,matches,late,file,loop_with_file\n";
-  for (const LoopRow& row : run.rows) {
-    const LoopResult& r = row.result;
-    if (!r.accepted) continue;
-    char numbers[128];
-    std::snprintf(numbers, sizeof numbers, "%ld,%ld,%.9g,%d,%d,%d,", run.Number(r.query),
-                  run.Number(r.candidate), r.probability, r.verification.inliers, r.verification.matches,
-                  row.second_word == SecondWord::kAccepted ? 1 : 0);
-    const auto candidate = static_cast<std::size_t>(r.candidate);
-    const std::string other = candidate < run.rows.size() ? run.rows[candidate].file : "";
-    text += numbers + Quoted(row.file) + "," + Quoted(other) + "\n";
-  }
-  return text;
-}
-
 LoopReport EvaluateRun(const LoopRun& run) {
   std::vector<LoopObservation> observations;
   for (const LoopRow& row : run.rows) observations.push_back(Observe(row.result));
@@ -223,8 +207,7 @@ LoopReport EvaluateRun(const LoopRun& run) {
   const std::vector<double> ms = Collect(run.rows, [](const LoopRow& row) { return row.ms; });
   report.ms_median = Quantile(ms, 0.5);
   report.ms_p99 = Quantile(ms, 0.99);
-  report.damaged = static_cast<int>(
-      std::count_if(run.rows.begin(), run.rows.end(), [](const LoopRow& row) { return !row.read; }));
+  report.damaged = static_cast<int>(Count(run, IsDamaged));
   return report;
 }
 
@@ -280,25 +263,13 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
 
 OutputLayout LoopsLayout(bool table) {
   const auto is_result = [](const std::filesystem::path& entry) {
-    static const std::set<std::string> kFiles = {"results.json",
-                                                 "hypotheses.csv",
-                                                 "loops.csv",
-                                                 "precision_recall.csv",
-                                                 "precision_recall.svg",
-                                                 "confusion.png",
-                                                 "contact_sheet.png",
-                                                 "precision_recall.png",
-                                                 "recall_by_view.csv",
-                                                 "recall_by_view.svg",
-                                                 "recall_by_view.png",
-                                                 "posteriors.csv",
-                                                 "earlier_loops.csv",
-                                                 "dump_candidates.csv",
-                                                 "dump_verification.csv",
-                                                 "table.json",
-                                                 "table.md",
-                                                 "table.csv"};
-    return kFiles.count(entry.filename().string()) > 0;
+    static const std::vector<std::string> kFiles = SplitText(
+        "results.json hypotheses.csv loops.csv precision_recall.csv precision_recall.svg "
+        "precision_recall.png confusion.png contact_sheet.png recall_by_view.csv recall_by_view.svg "
+        "recall_by_view.png posteriors.csv earlier_loops.csv dump_candidates.csv dump_verification.csv "
+        "table.json table.md table.csv",
+        " ");
+    return std::find(kFiles.begin(), kFiles.end(), entry.filename().string()) != kFiles.end();
   };
   const auto is_part = [](const std::filesystem::path& entry) {
     return std::filesystem::exists(entry / "results.json") || std::filesystem::exists(entry / "table.json");
@@ -315,7 +286,7 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   json["protocol"]["members"] = run.options.members;
   json["protocol"]["seed"] = run.options.seed;
   json["protocol"]["threads"] = run.options.threads;
-  if (run.earlier > 0) json["earlier"] = {{"images", run.earlier}, {"loops", EarlierLoops(run)}};
+  if (run.earlier > 0) json["earlier"] = {{"images", run.earlier}, {"loops", Count(run, IsEarlier)}};
   folder.Write({"results.json", [&](File file) { internal::WriteFile(file, JsonText(json)); }});
   folder.Write({"hypotheses.csv", [&](File file) { internal::WriteFile(file, Csv(run)); }});
   folder.Write({"loops.csv", [&](File file) { internal::WriteFile(file, FoundLoopsCsv(run)); }});
@@ -348,27 +319,26 @@ void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::files
   std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
   std::printf("%-34s %d (%d with a loop)\n", "images", verified.images, verified.rows_with_loop);
   std::printf("%-34s %s\n", "ground truth", internal::Printable(run.truth.description).c_str());
-  std::printf("%-34s %12s %12s %12s\n", "", "verified", "posterior", "ranked");
-  const auto line = [](const char* name, double a, double b, double c) {
-    std::printf("%-34s %11.1f%% %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b, 100 * c);
+  const auto line = [](const char* name, const std::vector<std::string>& cells) {
+    std::printf("%-34s", name);
+    for (const std::string& cell : cells) std::printf(" %12s", cell.c_str());
+    std::printf("\n");
   };
-  line("recall at 100 % precision", verified.recall_at_100_precision, posterior.recall_at_100_precision,
-       ranked.recall_at_100_precision);
-  line("area under the curve", verified.area_under_curve, posterior.area_under_curve,
-       ranked.area_under_curve);
-  line("best F1", verified.best_f1, posterior.best_f1, ranked.best_f1);
-  const auto decision = [](const char* name, double a, double b) {
-    std::printf("%-34s %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b);
+  const auto ranking = [&](const char* name, double LoopEvaluation::*figure) {
+    line(name, {Percent(verified.*figure), Percent(posterior.*figure), Percent(ranked.*figure)});
   };
-  decision("precision at the default threshold", verified.at_default_threshold.precision,
-           posterior.at_default_threshold.precision);
-  decision("recall at the default threshold", verified.at_default_threshold.recall,
-           posterior.at_default_threshold.recall);
-  decision("F1 at the default threshold", verified.f1_at_default, posterior.f1_at_default);
-  std::printf("%-34s %12s %12s %12s\n", "calibration error", CalibrationText(verified).c_str(),
-              CalibrationText(posterior).c_str(), CalibrationText(ranked).c_str());
-  std::printf("%-34s %12d %12d %12d\n", "  over n images", verified.calibration_images,
-              posterior.calibration_images, ranked.calibration_images);
+  const PrecisionRecall &v = verified.at_default_threshold, &p = posterior.at_default_threshold;
+  line("", {"verified", "posterior", "ranked"});
+  ranking("recall at 100 % precision", &LoopEvaluation::recall_at_100_precision);
+  ranking("area under the curve", &LoopEvaluation::area_under_curve);
+  ranking("best F1", &LoopEvaluation::best_f1);
+  line("precision at the default threshold", {Percent(v.precision), Percent(p.precision)});
+  line("recall at the default threshold", {Percent(v.recall), Percent(p.recall)});
+  line("F1 at the default threshold", {Percent(verified.f1_at_default), Percent(posterior.f1_at_default)});
+  line("calibration error", {CalibrationText(verified), CalibrationText(posterior), CalibrationText(ranked)});
+  line("  over n images",
+       {std::to_string(verified.calibration_images), std::to_string(posterior.calibration_images),
+        std::to_string(ranked.calibration_images)});
   std::printf("%-34s %d true, %d false, %d near misses (ignored pairs)\n", "accepted",
               verified.true_positives, verified.false_positives, verified.ignored);
   const std::ptrdiff_t late = CountSecondWords(run, SecondWord::kAccepted);
@@ -377,7 +347,7 @@ void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::files
     std::printf("%-34s %td accepted, %td withdrawn\n", "  by the second word", late, withdrawn);
   PrintRecallByView(report);
   if (run.earlier > 0) {
-    std::printf("%-34s %td images, into %lld\n", "loops into earlier runs", EarlierLoops(run),
+    std::printf("%-34s %td images, into %lld\n", "loops into earlier runs", Count(run, IsEarlier),
                 static_cast<long long>(run.earlier));
   }
   std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);

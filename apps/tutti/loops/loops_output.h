@@ -1,8 +1,10 @@
-// Output of `tutti loops`: results.json, hypotheses.csv, the pictures and the table on the terminal.
+// Output of `tutti loops`: results.json, hypotheses.csv, the pictures, the table on the terminal, and with
+// --table every rule and every member on one image set, the paper's Table 1 for it.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -10,8 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "apps/plot/plot.h"
 #include "apps/run/output_folder.h"
-#include "apps/tutti/files.h"
+#include "core/replaced_file.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/evaluation.h"
 #include "tutti/loopclosure/ground_truth.h"
@@ -72,8 +75,6 @@ LoopReport EvaluateRun(const LoopRun& run);
 const char* LabelName(LoopLabel label);
 /// "accepted", "withdrawn", or empty.
 const char* SecondWordName(SecondWord word);
-/// A cell of a CSV file that may hold anything.
-std::string Quoted(const std::string& text);
 
 /// The figures of results.json, without the protocol.
 nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report);
@@ -84,9 +85,6 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run);
 /// What one run leaves in its folder, or a table of runs, each of which has a folder of its own in it.
 OutputLayout LoopsLayout(bool table = false);
 
-/// The loops that were accepted, one a line: both images with their files, probability, inliers.
-std::string FoundLoopsCsv(const LoopRun& run);
-
 /// Writes all files of a run and puts them into place. Returns where. Throws InputError that names those that
 /// can't be written.
 std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report, bool finished,
@@ -94,5 +92,83 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
 
 /// Prints the figures of one run.
 void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+
+// Pictures: colours that the colour-blind can tell apart (Okabe and Ito), and marks that differ in shape as
+// well.
+constexpr const char* kTrueColor = "#0072b2";    // blue
+constexpr const char* kFalseColor = "#d55e00";   // vermilion
+constexpr const char* kMissedColor = "#e69f00";  // orange
+
+/// Adds one result's kept posterior to a picture of `images` x `images`, scaled down where that is too large.
+void AddPosterior(const LoopResult& result, int images, cv::Mat& posterior);
+
+/// The curves of precision over recall: precision_recall.csv, and the picture.
+void WriteCurvesCsv(const LoopReport& report, const std::filesystem::path& file);
+CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report);
+
+/// Ground truth by overlap: recall over the overlap and the angle of the earlier view that shares most.
+void WriteRecallByViewCsv(const LoopReport& report, const std::filesystem::path& file);
+CurvePlot PlotRecallByView(const LoopRun& run, const LoopReport& report);
+
+/// Ground truth, posterior and what was said, side by side.
+void WriteConfusion(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file);
+
+/// Every false positive and every missed loop, up to a stated number: the image, what was proposed, and what
+/// the ground truth says. Reads the images again.
+void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file);
+
+/// "mean, 84 images of corridor, 44 with a loop", for titles.
+std::string RunTitle(const LoopRun& run, const LoopReport& report);
+
+/// One line of the table.
+struct LoopTableRow {
+  std::string rule;     ///< the word of --rule, and the name of its folder
+  bool single = false;  ///< a member alone
+  nlohmann::ordered_json figures;
+  LoopReport report;
+};
+
+struct LoopTable {
+  nlohmann::ordered_json protocol;
+  std::vector<int> loop_images;  ///< the images that have a loop; the tests are over them
+  std::vector<LoopTableRow> rows;
+};
+
+/// The words of --rule that the table runs: mean, product, majority, naive, and each member alone.
+std::vector<std::string> TableRules(const LoopDetectorOptions& options);
+
+/// Adds one rule's outcome, and what is common to all rules.
+void AddToTable(const LoopRun& run, const LoopReport& report, LoopTable& table);
+
+/// Prints the table and puts table.json, table.md and table.csv into place. Throws InputError if they can't
+/// be written.
+void WriteLoopTable(const LoopTable& table, OutputFolder& folder);
+
+// What each candidate looked like to the detector, and what each member believed of each location, as files:
+// for those who want to learn from it.
+
+/// Writes dump_candidates.csv and dump_verification.csv (docs/outputs.md), image by image: all of a long walk
+/// would not fit into memory. Needs results of a detector with LoopDetectorOptions::keep_evidence.
+class LoopsDump {
+ public:
+  /// Opens both files in `folder` (made if missing) and writes their headers. Throws InputError if it can't.
+  LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members);
+  /// Appends the lines of one image of the run; `truth` is for all its images.
+  void Add(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth);
+  /// Appends what was decided later about an image: its verification, with `late` 1.
+  void AddLate(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth);
+  /// To be called at the end: then the files are there. Throws InputError if the files could not be written
+  /// in full.
+  void Finish();
+
+ private:
+  internal::ReplacedFile candidates_file_, verification_file_;
+  std::ofstream candidates_, verification_;
+};
+
+/// Writes `file`: "image,location,truth,combined,<member>..." for every pair that is a loop (truth 255; 128:
+/// ignored, 0: none) or where one of the posteriors is at least 1e-4. Needs a run with
+/// LoopDetectorOptions::keep_posterior. Throws InputError if it can't be written.
+void WritePosteriors(const LoopRun& run, const std::filesystem::path& file);
 
 }  // namespace tutti::cli

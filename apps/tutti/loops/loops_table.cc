@@ -1,8 +1,10 @@
-#include "apps/tutti/loops/loops_table.h"
-
+// The table of `tutti loops --table`.
 #include <algorithm>
 #include <cstdio>
 
+#include "apps/tutti/files.h"
+#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/text_table.h"
 #include "core/replaced_file.h"
 #include "tutti/core/significance.h"
 
@@ -85,11 +87,7 @@ Json Significance(const LoopTable& table) {
   return tests;
 }
 
-std::string PercentCell(const Json& share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f", 100 * share.get<double>());
-  return text;
-}
+std::string PercentCell(const Json& share) { return Formatted("%.1f", 100 * share.get<double>()); }
 
 // "95.5 / 88.6": with verification / posterior only.
 std::string Both(const Json& figures, const std::string& key, const char* inner = nullptr) {
@@ -118,26 +116,22 @@ std::string TableLine(const std::vector<std::string>& cells) {
   return line + "\n";
 }
 
-std::string PText(double p) {
-  char text[32];
-  std::snprintf(text, sizeof text, p < 1e-4 ? "%.1e" : "%.4f", p);
-  return text;
-}
+std::string PText(double p) { return p < 1e-4 ? Formatted("%.1e", p) : Formatted("%.4f", p); }
 
 std::string SignificanceText(const Json& tests) {
   std::string text;
   for (const Json& test : tests) {
-    char t[48];
-    const Json& value = test["t_test"]["t"];
-    const double t_value = value.is_number() ? value.get<double>() : 0;
-    std::snprintf(t, sizeof t, "t(%d) = %.2f", test["t_test"]["degrees_of_freedom"].get<int>(), t_value);
     const Json& m = test["mcnemar"];
-    text += "* " + test["a"].get<std::string>() + " against " + test["b"].get<std::string>() + ", " +
-            (test["ranking"] == "verified" ? "with verification" : "posterior only") + ": found only by " +
-            test["a"].get<std::string>() + " " + std::to_string(m["only_a"].get<int>()) + ", only by " +
-            test["b"].get<std::string>() + " " + std::to_string(m["only_b"].get<int>()) + "; McNemar (" +
-            m["method"].get<std::string>() + ") p = " + PText(m["p"]) + "; paired t-test " + t +
-            ", p = " + PText(test["t_test"]["p"]) + "\n";
+    const Json& t = test["t_test"]["t"];  // null: infinite
+    const std::string a = test["a"].get<std::string>(), b = test["b"].get<std::string>();
+    text += Formatted(
+        "* %s against %s, %s: found only by %s %d, only by %s %d; McNemar (%s) p = %s; paired t-test t(%d) = "
+        "%.2f, p = %s\n",
+        a.c_str(), b.c_str(), test["ranking"] == "verified" ? "with verification" : "posterior only",
+        a.c_str(), m["only_a"].get<int>(), b.c_str(), m["only_b"].get<int>(),
+        m["method"].get<std::string>().c_str(), PText(m["p"]).c_str(),
+        test["t_test"]["degrees_of_freedom"].get<int>(), t.is_number() ? t.get<double>() : 0.0,
+        PText(test["t_test"]["p"]).c_str());
   }
   return text;
 }
@@ -161,14 +155,13 @@ std::string Markdown(const LoopTable& table, const Json& json) {
                      "calibration error", "ms per image"});
   text += "|---|---|---|---|---|---|---|---|---|---|\n";
   for (const LoopTableRow& row : table.rows) {
-    char ms[32];
-    std::snprintf(ms, sizeof ms, "%.1f", row.report.ms_median);
     text += TableLine(
         {row.rule, Both(row.figures, "recall_at_100_precision"),
          PercentCell(row.figures["recall_at_100_precision_ranked"]), Both(row.figures, "area_under_curve"),
          Both(row.figures, "best_f1"), Both(row.figures, "at_default_threshold", "precision"),
          Both(row.figures, "at_default_threshold", "recall"), Both(row.figures, "f1_at_default"),
-         Calibration(row.figures, "") + " / " + Calibration(row.figures, "_posterior"), ms});
+         Calibration(row.figures, "") + " / " + Calibration(row.figures, "_posterior"),
+         Formatted("%.1f", row.report.ms_median)});
   }
   text += "\nOver the images with a loop, found at each rule's own threshold of 100 % precision or not:\n\n";
   return text + SignificanceText(json["significance"]);
@@ -190,10 +183,7 @@ std::string TableCsv(const LoopTable& table) {
   }
   text += ",ms_per_image_median,ms_per_image_p99\n";
   const auto number = [](const Json& value) {
-    if (value.is_null()) return std::string(",");
-    char cell[32];
-    std::snprintf(cell, sizeof cell, ",%.9g", value.get<double>());
-    return std::string(cell);
+    return value.is_null() ? std::string(",") : Formatted(",%.9g", value.get<double>());
   };
   for (const LoopTableRow& row : table.rows) {
     text += row.rule;

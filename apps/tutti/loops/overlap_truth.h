@@ -4,8 +4,6 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/core.hpp>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "apps/tutti/loops/loops_input.h"

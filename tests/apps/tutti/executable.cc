@@ -1,5 +1,7 @@
 #include "tests/apps/tutti/executable.h"
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -57,7 +59,8 @@ ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const
   return RunProgramAndSignal(TUTTI_EXECUTABLE, arguments, text, signal);
 }
 
-ProcessResult RunTutti(const std::vector<std::string>& arguments) {
+ProcessResult RunTutti(std::vector<std::string> arguments, const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
   return RunTuttiAndSignal(arguments, "", 0);
 }
 
@@ -79,12 +82,30 @@ std::filesystem::path RunMadeOnce(const std::filesystem::path& config, const std
   });
 }
 
+std::string Done(const ProcessResult& run) {
+  EXPECT_EQ(run.status, 0) << run.output;
+  return run.output;
+}
+
+void ExpectRefusal(const ProcessResult& run, const std::vector<std::string>& words) {
+  EXPECT_EQ(run.status, 1) << run.output;
+  for (const std::string& word : words) EXPECT_THAT(run.output, ::testing::HasSubstr(word));
+}
+
+ProcessResult RunInShell(const std::string& script, const std::vector<std::string>& arguments) {
+  std::vector<std::string> words = {"-c", script, "sh", TUTTI_EXECUTABLE};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return RunProgramAndSignal("/bin/sh", words, "", 0);
+}
+
 std::string ReadAll(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::stringstream text;
   text << in.rdbuf();
   return text.str();
 }
+
+nlohmann::json ReadJson(const std::filesystem::path& file) { return nlohmann::json::parse(ReadAll(file)); }
 
 void WriteAll(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;

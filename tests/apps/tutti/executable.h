@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -20,8 +21,8 @@ ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
                                   const std::vector<std::string>& arguments, const std::string& text,
                                   int signal);
 
-/// Runs tutti with these arguments and waits for it.
-ProcessResult RunTutti(const std::vector<std::string>& arguments);
+/// Runs tutti with these arguments, and `more` at the end, and waits for it.
+ProcessResult RunTutti(std::vector<std::string> arguments, const std::vector<std::string>& more = {});
 
 /// `tutti run` with these, and `more` at the end.
 std::vector<std::string> RunArguments(const std::filesystem::path& config,
@@ -37,7 +38,16 @@ std::filesystem::path RunMadeOnce(const std::filesystem::path& config, const std
 ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
                                 int signal);
 
+/// Expects that the program was content, and returns what it printed.
+std::string Done(const ProcessResult& run);
+/// Expects that it refused what it was told: status 1, and these words.
+void ExpectRefusal(const ProcessResult& run, const std::vector<std::string>& words);
+
+/// A script of the shell, in which "$@" is tutti with these arguments.
+ProcessResult RunInShell(const std::string& script, const std::vector<std::string>& arguments);
+
 std::string ReadAll(const std::filesystem::path& file);
+nlohmann::json ReadJson(const std::filesystem::path& file);
 void WriteAll(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace tutti::testing

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -18,6 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ReadAll;
@@ -65,9 +65,7 @@ TEST_F(HardInput, ATrajectoryIsTheSameWithMarkCarriageReturnsAndCommas) {
   for (const std::string& text : {kMark + Tum(), Replaced(Tum(), '\n', "\r\n"), Replaced(Tum(), ' ', ","),
                                   Replaced(Tum(), ' ', ", ")}) {
     const fs::path other = File("other.txt", text), out = folder_ / "out.txt";
-    const auto run = RunTutti({"convert", other, out, "--to", "tum"});
-    EXPECT_EQ(run.status, 0) << run.output;
-    EXPECT_THAT(run.output, HasSubstr("(tum)"));
+    EXPECT_THAT(Done(RunTutti({"convert", other, out, "--to", "tum"})), HasSubstr("(tum)"));
     ASSERT_EQ(RunTutti({"convert", plain, folder_ / "as_is.txt", "--to", "tum"}).status, 0);
     EXPECT_EQ(ReadAll(out), ReadAll(folder_ / "as_is.txt"));
   }
@@ -104,9 +102,8 @@ TEST_F(HardInput, LongWordsAreCutOff) {
   ExpectRefused(RunTutti({"optimize", File("tag.g2o", word + " 1 2\n"), "--out", folder_ / "o"}), "XXX...");
   const fs::path more = File("more.g2o", Graph(word + " 1\n"));
   ExpectRefused(RunTutti({"optimize", more, "--out", folder_ / "o"}), "XXX... (1 line)");
-  const auto warned = RunTutti({"optimize", more, "--out", folder_ / "o", "--ignore-unknown"});
-  EXPECT_EQ(warned.status, 0);
-  EXPECT_LT(warned.output.size(), 1500U);
+  const std::string warned = Done(RunTutti({"optimize", more, "--out", folder_ / "o", "--ignore-unknown"}));
+  EXPECT_LT(warned.size(), 1500U);
   ExpectRefused(RunTutti({"convert", File("t.txt", word + " 0 0 0 0 0 0 1\n"), folder_ / "o", "--to", "tum"}),
                 "XXX...' is not a number");
 }
@@ -114,19 +111,18 @@ TEST_F(HardInput, LongWordsAreCutOff) {
 TEST_F(HardInput, WhereNothingCanMoveThereAreNoIterations) {
   const fs::path graph = File("fixed.g2o", Graph("FIX 0\nFIX 1\n"));
   for (const char* solver : {"ceres", "block"}) {
-    const auto run = RunTutti({"optimize", graph, "--out", folder_ / "o.g2o", "--solver", solver});
-    EXPECT_EQ(run.status, 0);
-    EXPECT_THAT(run.output, HasSubstr("after 0 iterations"));
+    EXPECT_THAT(Done(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o", "--solver", solver})),
+                HasSubstr("after 0 iterations"));
   }
 }
 
 TEST_F(HardInput, NamesThatAreNotUtf8KeepTheResults) {
   const fs::path tum = File(std::string(kNoUtf8) + ".txt", Tum()), json = folder_ / "out.json";
   EXPECT_EQ(RunTutti({"evaluate", "--reference", tum, "--estimate", tum, "--json", json}).status, 0);
-  EXPECT_NO_THROW(nlohmann::json::parse(ReadAll(json)));
+  EXPECT_NO_THROW(testing::ReadJson(json));
   const fs::path graph = File(std::string(kNoUtf8) + ".g2o", Graph());
   EXPECT_EQ(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o", "--json", json}).status, 0);
-  EXPECT_NO_THROW(nlohmann::json::parse(ReadAll(json)));
+  EXPECT_NO_THROW(testing::ReadJson(json));
 }
 
 TEST_F(HardInput, NumbersHaveABound) {
@@ -269,10 +265,8 @@ TEST_F(HardInput, LoopsSkipsAndCountsWhatIsNoImage) {
   fs::resize_file(images / "d.png", 300000000000ULL);
   fs::create_directories(images / "e.png");
   WriteAll(folder_ / "truth.txt", Replaced(std::string(kGood + kBad, 'x'), 'x', "0 0 0 0 0 0 0 0\n"));
-  const auto run =
-      RunTutti({"loops", "--images", images, "--ground-truth", folder_ / "truth.txt", "--out", out});
-  ASSERT_EQ(run.status, 0) << run.output;
-  const auto json = nlohmann::json::parse(ReadAll(out / "results.json"));
+  Done(RunTutti({"loops", "--images", images, "--ground-truth", folder_ / "truth.txt", "--out", out}));
+  const auto json = testing::ReadJson(out / "results.json");
   EXPECT_EQ(json["images"], kGood + kBad);
   EXPECT_EQ(json["images_damaged"], kBad);
 }
@@ -297,16 +291,13 @@ TEST_F(HardInput, WhatRanOutIsSaid) {
 #ifdef TUTTI_SANITIZED
   GTEST_SKIP() << "sanitizers need more addresses than the limit leaves";
 #endif
-  const auto limited = [&](const std::string& limit, std::vector<std::string> arguments) {
-    std::vector<std::string> shell = {"-c", "ulimit " + limit + "; exec \"$0\" \"$@\"", TUTTI_EXECUTABLE};
-    shell.insert(shell.end(), arguments.begin(), arguments.end());
-    return testing::RunProgramAndSignal("/bin/sh", shell, "", 0);
-  };
   std::string long_graph;
   for (int i = 0; i < 300000; ++i)
     long_graph += "EDGE_SE2 " + std::to_string(i) + " " + std::to_string(i + 1) + " 1 0 0 1 0 0 1 0 1\n";
-  ExpectRefused(limited("-v 150000", {"optimize", File("long.g2o", long_graph), "--out", folder_ / "o"}),
-                "not enough memory");
+  const fs::path graph = File("long.g2o", long_graph);
+  ExpectRefused(
+      testing::RunInShell("ulimit -v 150000; exec \"$@\"", {"optimize", graph, "--out", folder_ / "o"}),
+      "not enough memory");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// `tutti loops`, end to end, through the real executable.
+// `tutti loops` and `tutti compare-loops`, end to end, through the real executable.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,12 +15,15 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using testing::kEmptySheet;
 using testing::kLoopImages;
 using testing::kLoopPlaces;
 using ::testing::Not;
 using testing::ReadAll;
+using testing::RunTutti;
 using ::testing::StartsWith;
 using testing::WriteAll;
 
@@ -28,34 +31,21 @@ class LoopsCommand : public testing::LoopsFixture {};
 
 TEST_F(LoopsCommand, WritesEverythingThatScriptsRelyOn) {
   WriteImages();
-  const auto run = Run(Truth(TruePairs()), out_);
-  ASSERT_EQ(run.status, 0) << run.output;
+  const std::string run = Done(Run(Truth(TruePairs()), out_));
   ExpectAllFiles(out_);
   const nlohmann::json r = Json(out_ / "results.json");
   EXPECT_EQ(r["images"], kLoopImages);
   EXPECT_EQ(r["rows_with_loop"], 5);
   EXPECT_EQ(r["accepted"]["false"], 0);
   EXPECT_GT(r["recall_at_100_precision"].get<double>(), 0.5);
-  for (const char* key : {"images_damaged",
-                          "recall_at_100_precision_posterior",
-                          "area_under_curve",
-                          "area_under_curve_posterior",
-                          "best_f1",
-                          "best_f1_posterior",
-                          "at_default_threshold",
-                          "at_default_threshold_posterior",
-                          "ms_per_image",
-                          "stage_ms_median",
-                          "protocol",
-                          "recall_at_100_precision_ranked",
-                          "area_under_curve_ranked",
-                          "best_f1_ranked",
-                          "f1_at_default",
-                          "f1_at_default_posterior",
-                          "calibration_error",
-                          "calibration_error_ranked",
-                          "calibration_error_posterior",
-                          "calibration_images"})
+  for (const std::string& key :
+       SplitText("images_damaged recall_at_100_precision_posterior area_under_curve "
+                 "area_under_curve_posterior best_f1 best_f1_posterior at_default_threshold "
+                 "at_default_threshold_posterior ms_per_image stage_ms_median protocol "
+                 "recall_at_100_precision_ranked area_under_curve_ranked best_f1_ranked f1_at_default "
+                 "f1_at_default_posterior calibration_error calibration_error_ranked "
+                 "calibration_error_posterior calibration_images",
+                 " "))
     EXPECT_TRUE(r.contains(key)) << key;
   EXPECT_EQ(r["protocol"]["rule"], "joint");
   EXPECT_EQ(r["protocol"]["tolerance_frames"], 0);
@@ -69,8 +59,7 @@ TEST_F(LoopsCommand, WritesEverythingThatScriptsRelyOn) {
     EXPECT_EQ(images, r[std::string("calibration_images") + suffix]);
     EXPECT_EQ(r[std::string("reliability") + suffix].size(), 10u);
   }
-  EXPECT_THAT(run.output,
-              AllOf(HasSubstr("ranked"), HasSubstr("calibration error"), HasSubstr("over n images")));
+  EXPECT_THAT(run, AllOf(HasSubstr("ranked"), HasSubstr("calibration error"), HasSubstr("over n images")));
   EXPECT_FALSE(fs::exists(out_ / "dump_candidates.csv"));
   EXPECT_THAT(ReadAll(out_ / "hypotheses.csv"),
               StartsWith("image,file,hypothesis,candidate,posterior,probability,proposed,"));
@@ -143,7 +132,7 @@ TEST_F(LoopsCommand, TheTableHoldsEveryRuleWithItsOwnFolder) {
     EXPECT_LE(test["mcnemar"]["p"].get<double>(), 1);
     EXPECT_LE(test["t_test"]["p"].get<double>(), 1);
   }
-  // The same bytes as a run of that rule alone.
+  // A run of that rule alone gives the same bytes.
   ASSERT_EQ(Run(truth, folder_ / "naive", {"--rule", "naive"}).status, 0);
   EXPECT_EQ(ReadAll(folder_ / "naive" / "hypotheses.csv"), ReadAll(out_ / "naive" / "hypotheses.csv"));
 }
@@ -199,8 +188,7 @@ TEST_F(LoopsCommand, ADumpOfImagesWithoutFeaturesHasNoCandidates) {
   fs::create_directories(images_);
   for (int i = 0; i < 15; ++i)
     cv::imwrite((images_ / (std::to_string(i) + ".png")).string(), cv::Mat(120, 160, CV_8U, cv::Scalar(90)));
-  const auto run = Run(Truth({}, 15), out_, {"--dump"});
-  ASSERT_EQ(run.status, 0) << run.output;
+  Done(Run(Truth({}, 15), out_, {"--dump"}));
   for (const char* name : {"dump_candidates.csv", "dump_verification.csv"}) {
     const std::string text = ReadAll(out_ / name);
     EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << name;
@@ -212,8 +200,7 @@ TEST_F(LoopsCommand, ADumpOfImagesWithoutFeaturesHasNoCandidates) {
 
 TEST_F(LoopsCommand, NumbersAreThoseOfAllImagesAlsoWithAStride) {
   WriteImages();
-  const auto run = Run(Truth(TruePairs()), out_, {"--stride", "5", "--keep-posterior", "--dump"});
-  ASSERT_EQ(run.status, 0) << run.output;
+  Done(Run(Truth(TruePairs()), out_, {"--stride", "5", "--keep-posterior", "--dump"}));
   std::istringstream lines(ReadAll(out_ / "hypotheses.csv"));
   std::string line;
   std::getline(lines, line);
@@ -238,9 +225,7 @@ TEST_F(LoopsCommand, NumbersAreThoseOfAllImagesAlsoWithAStride) {
 
 TEST_F(LoopsCommand, ATableOfOneRuleIsAContradiction) {
   WriteImages(2);
-  const auto run = Run(Truth({}, 2), out_, {"--table", "--rule", "mean"});
-  EXPECT_NE(run.status, 0);
-  EXPECT_THAT(run.output, AllOf(HasSubstr("--table"), HasSubstr("--rule")));
+  ExpectRefusal(Run(Truth({}, 2), out_, {"--table", "--rule", "mean"}), {"--table", "--rule"});
 }
 
 TEST_F(LoopsCommand, NothingWrongGivesAContactSheetThatSaysNone) {
@@ -253,8 +238,7 @@ TEST_F(LoopsCommand, OneImageAloneIsARunAndATable) {
   WriteImages(1);
   const fs::path truth = folder_ / "pairs.txt";
   WriteAll(truth, "0\n");
-  const auto run = Run(truth, out_);
-  ASSERT_EQ(run.status, 0) << run.output;
+  Done(Run(truth, out_));
   ExpectAllFiles(out_);
   EXPECT_THAT(ReadAll(out_ / "precision_recall.svg"),
               AllOf(HasSubstr("the curves are empty"), Not(HasSubstr("nan"))));
@@ -266,16 +250,14 @@ TEST_F(LoopsCommand, OneImageAloneIsARunAndATable) {
 TEST_F(LoopsCommand, AnOutputFolderThatCantBeMadeIsOneLine) {
   WriteImages(1);
   WriteAll(folder_ / "pairs.txt", "0\n");
-  const auto run = Run(folder_ / "pairs.txt", "/proc/tutti-out");
-  EXPECT_EQ(run.status, 1);
-  EXPECT_THAT(run.output, HasSubstr("/proc/tutti-out"));
+  ExpectRefusal(Run(folder_ / "pairs.txt", "/proc/tutti-out"), {"/proc/tutti-out"});
 }
 
 TEST_F(LoopsCommand, CtrlCWritesTheImagesSoFar) {
   WriteImages();
-  const auto run = testing::RunTuttiAndSignal({"loops", "--images", images_.string(), "--ground-truth",
-                                               Truth(TruePairs()).string(), "--out", out_.string()},
-                                              " 20%", SIGINT);
+  const auto run = testing::RunTuttiAndSignal(
+      {"loops", "--images", images_, "--ground-truth", Truth(TruePairs()).string(), "--out", out_}, " 20%",
+      SIGINT);
   EXPECT_EQ(run.status, 130) << run.output;
   EXPECT_LT(Json(out_ / "results.json")["images"].get<int>(), kLoopImages);
   ExpectAllFiles(out_);
@@ -283,14 +265,60 @@ TEST_F(LoopsCommand, CtrlCWritesTheImagesSoFar) {
 
 TEST_F(LoopsCommand, AForeignFolderIsRefusedAndAnEarlierResultReplaced) {
   WriteImages();
-  const auto refused = Run(Truth(TruePairs()), images_);
-  EXPECT_EQ(refused.status, 1) << refused.output;
-  EXPECT_THAT(refused.output, HasSubstr("choose another --out"));
+  ExpectRefusal(Run(Truth(TruePairs()), images_), {"choose another --out"});
   EXPECT_FALSE(fs::exists(images_ / "results.json"));
   ASSERT_EQ(Run(Truth(TruePairs()), out_, {"--rule", "orb", "--dump"}).status, 0);
   EXPECT_EQ(Run(Truth(TruePairs()), out_, {"--rule", "orb"}).status, 0);
   EXPECT_FALSE(fs::exists(out_ / "dump_candidates.csv"));  // it was the earlier run's
   ExpectAllFiles(out_);
+}
+
+class CompareLoops : public testing::LoopsFixture {};
+
+std::string SmallTable(double joint, double naive, double surf) {
+  nlohmann::json table;
+  table["best_single"] = {{"verified", "surf"}, {"posterior", "surf"}};
+  for (const auto& [rule, recall] : std::vector<std::pair<std::string, double>>{
+           {"joint", joint}, {"mean", surf}, {"naive", naive}, {"surf", surf}})
+    table["rules"][rule] = {{"recall_at_100_precision", recall},
+                            {"recall_at_100_precision_posterior", recall}};
+  return table.dump();
+}
+
+TEST_F(CompareLoops, CompareLoopsIsThePairedTTestOverTheSets) {
+  // joint - naive: 0.3, 0.2, 0.1, 0.3, 0.1: their mean 0.2, deviation 0.1, t = 0.2 / (0.1 / sqrt 5) = 4.4721.
+  // With four degrees of freedom and x = t / sqrt(4 + t^2), p = 1 - x (3 - x^2) / 2 = 0.0111.
+  const std::vector<std::pair<double, double>> recalls = {
+      {0.8, 0.5}, {0.9, 0.7}, {0.7, 0.6}, {0.7, 0.4}, {0.9, 0.8}};
+  const std::string out = (folder_ / "t.json").string();
+  std::vector<std::string> arguments = {"compare-loops", "--out", out};
+  for (const auto& [joint, naive] : recalls) {
+    arguments.push_back((folder_ / (std::to_string(arguments.size()) + ".json")).string());
+    WriteAll(arguments.back(), SmallTable(joint, naive, joint));
+  }
+  Done(RunTutti(arguments));
+  const nlohmann::json tests = Json(out);
+  ASSERT_EQ(tests.size(), 8u);
+  EXPECT_EQ(tests[1]["a"], "joint");
+  EXPECT_EQ(tests[1]["b"], "naive");
+  EXPECT_EQ(tests[1]["sets"], 5);
+  EXPECT_NEAR(tests[1]["t"].get<double>(), 4.4721, 1e-4);
+  EXPECT_NEAR(tests[1]["p"].get<double>(), 0.0111, 1e-4);
+  EXPECT_EQ(tests[2]["b"], "best single");
+  EXPECT_EQ(tests[2]["p"], 1.0);  // no difference at all
+  // Four sets are too few for a p.
+  arguments.pop_back();
+  const std::string few = Done(RunTutti(arguments));
+  EXPECT_FALSE(Json(out)[1].contains("p"));
+  EXPECT_THAT(few, HasSubstr("p is given from 5 sets on"));
+}
+
+TEST_F(CompareLoops, CompareLoopsRefusesWhatIsNoTable) {
+  WriteAll(folder_ / "1.json", "[1, 2");
+  WriteAll(folder_ / "2.json", R"({"rules": {}, "best_single": {}})");
+  for (const char* name : {"1.json", "2.json", "none.json"}) {
+    ExpectRefusal(RunTutti({"compare-loops", folder_ / name}), {name});
+  }
 }
 
 }  // namespace

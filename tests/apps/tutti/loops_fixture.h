@@ -48,18 +48,15 @@ class LoopsFixture : public ::testing::Test {
   }
   ProcessResult Run(const std::filesystem::path& truth, const std::filesystem::path& out,
                     const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"loops",        "--images", images_.string(), "--ground-truth",
-                                          truth.string(), "--out",    out.string()};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunTutti(arguments);
+    return RunTutti(
+        {"loops", "--images", images_.string(), "--ground-truth", truth.string(), "--out", out.string()},
+        more);
   }
   // Without a ground truth, into a folder of that name; images are old from the third on.
   ProcessResult List(const std::filesystem::path& images, const std::string& out,
                      const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"loops", images.string(), "--out", (folder_ / out).string(),
-                                          "--set", "stm_size=3"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunTutti(arguments);
+    return RunTutti({"loops", images.string(), "--out", (folder_ / out).string(), "--set", "stm_size=3"},
+                    more);
   }
   // The lines of loops.csv without the names of the images.
   std::string Listed(const std::string& out) const {

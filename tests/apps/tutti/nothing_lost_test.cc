@@ -1,16 +1,21 @@
-// `tutti run` that is killed, hung up on, or out of room: what was computed, now or earlier, is there.
+// `tutti run` that is killed, hung up on, or out of room, with a camera or a computer that fails in the
+// middle: what was computed, now or earlier, is there.
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <ctime>
+#include <iomanip>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
 
 #include "apps/run/outputs.h"
 #include "apps/run/runner.h"
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
-#include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
 
 namespace tutti {
@@ -18,28 +23,27 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
 using ::testing::StartsWith;
 
-class NothingLost : public ::testing::Test {
+class NothingLost : public testing::TownTest {
  protected:
   std::vector<std::string> Arguments(std::vector<std::string> more = {}) const {
     more.insert(more.begin(), "--no-report");
-    return testing::RunArguments(testing::TinyConfig(folder_), testing::TinyTown(), out_, more);
+    return testing::RunArguments(config_, testing::TinyTown(), out_, more);
   }
   testing::ProcessResult Run(const std::vector<std::string>& more = {}) const {
     return RunTutti(Arguments(more));
   }
   // Through a shell, which sets something before.
   testing::ProcessResult RunAfter(const std::string& command, const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {"-c", command + " \"$0\" \"$@\"", TUTTI_EXECUTABLE};
-    const std::vector<std::string> arguments = Arguments(more);
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    return testing::RunProgramAndSignal("/bin/sh", words, "", 0);
+    return testing::RunInShell(command + " \"$@\"", Arguments(more));
   }
-  // Of the result, without what is hidden or grows.
+  // Files of the result, without what is hidden or grows.
   std::map<std::string, std::string> Files() const {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::directory_iterator(out_)) {
@@ -48,8 +52,6 @@ class NothingLost : public ::testing::Test {
     }
     return files;
   }
-
-  const fs::path folder_ = testing::FreshFolder(), out_ = folder_ / "out";
 };
 
 TEST_F(NothingLost, KilledARunLeavesTheEarlierResultAndItsPosesSoFar) {
@@ -110,20 +112,18 @@ TEST_F(NothingLost, WhatWasInterruptedDoesNotReplaceAFinishedResult) {
   const auto run = testing::RunTuttiAndSignal(Arguments(), " 20%", SIGTERM);
   EXPECT_EQ(run.status, 130) << run.output;
   EXPECT_THAT(run.output, HasSubstr("is in " + (out_ / "unfinished").string()));
-  const auto summary = nlohmann::json::parse(ReadAll(out_ / "unfinished" / "summary.json"));
+  const auto summary = testing::ReadJson(out_ / "unfinished" / "summary.json");
   EXPECT_FALSE(summary["finished"].get<bool>());
   EXPECT_GT(ReadTrajectory(out_ / "unfinished" / "trajectory.txt", TrajectoryFormat::kTum).size(), 4u);
-  EXPECT_EQ(RunTutti({"collect", out_.string()}).status, 0);
+  EXPECT_EQ(RunTutti({"collect", out_}).status, 0);
   fs::remove_all(out_ / "unfinished");
   EXPECT_EQ(Files(), earlier);
 }
 
 TEST_F(NothingLost, WhatHasNoRoomIsNamedAndTheRestIsWritten) {
   // 10 KB a file: enough for the trajectories, too little for the pictures.
-  const auto run = RunAfter("ulimit -f 20; exec", {});
-  EXPECT_EQ(run.status, 1) << run.output;
-  EXPECT_THAT(run.output, AllOf(HasSubstr("trajectory.png: File too large"),
-                                HasSubstr("the rest is in " + out_.string())));
+  ExpectRefusal(RunAfter("ulimit -f 20; exec", {}),
+                {"trajectory.png: File too large", "the rest is in " + out_.string()});
   EXPECT_EQ(ReadTrajectory(out_ / "trajectory.txt", TrajectoryFormat::kTum).size(),
             static_cast<std::size_t>(testing::kTinyFrames));
   EXPECT_TRUE(fs::exists(out_ / "summary.json"));
@@ -140,9 +140,7 @@ TEST_F(NothingLost, AFileAtItsLimitEndsTheRunLikeAHangUp) {
 }
 
 TEST_F(NothingLost, ATraceThatCanNotBeWrittenCostsNothingElse) {
-  const auto run = Run({"--end", "4", "--trace", "/dev/full"});
-  EXPECT_EQ(run.status, 1) << run.output;
-  EXPECT_THAT(run.output, AllOf(HasSubstr("/dev/full"), HasSubstr("No space left on device")));
+  ExpectRefusal(Run({"--end", "4", "--trace", "/dev/full"}), {"/dev/full", "No space left on device"});
   EXPECT_EQ(Files().size(), 10u);
 }
 
@@ -160,24 +158,20 @@ TEST_F(NothingLost, ForeignFoldersAreRefusedAndStayAsTheyAre) {
 TEST_F(NothingLost, TheReferenceIsNotReplaced) {
   ASSERT_EQ(Run({"--end", "4"}).status, 0);
   const auto earlier = Files();
-  const auto run = Run({"--ground-truth", (out_ / "trajectory.txt").string()});
-  EXPECT_EQ(run.status, 1);
-  EXPECT_THAT(run.output, HasSubstr("trajectory.txt, which this run reads"));
+  ExpectRefusal(Run({"--ground-truth", out_ / "trajectory.txt"}), {"trajectory.txt, which this run reads"});
   EXPECT_EQ(Files(), earlier);
 }
 
 TEST_F(NothingLost, ASecondRunOnOneFolderIsRefusedWithTheFirstOnesProcess) {
   const OutputFolder first(out_,
                            {[](const fs::path&) { return false; }, "summary.json", "version", {}, nullptr});
-  const auto run = Run();
-  EXPECT_EQ(run.status, 1);
-  EXPECT_THAT(run.output, HasSubstr("process " + std::to_string(getpid())));
+  ExpectRefusal(Run(), {"process " + std::to_string(getpid())});
 }
 
 TEST_F(NothingLost, ComparingIntoAForeignFolderIsRefused) {
   const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
-  const auto run = RunTutti({"compare", "--config", testing::TinyConfig(folder_).string(), "--dataset",
-                             data.string(), "--out", data.string(), "--runs", "1"});
+  const auto run =
+      RunTutti({"compare", "--config", config_, "--dataset", data, "--out", data, "--runs", "1"});
   EXPECT_EQ(run.status, 1);
   EXPECT_THAT(run.output, AllOf(StartsWith("tutti: " + data.string()), HasSubstr("choose another --out")));
   EXPECT_FALSE(fs::exists(data / "odometry"));
@@ -198,6 +192,77 @@ TEST_F(NothingLost, LivePosesAreTheSameForAnyNumberOfThreads) {
   const std::string one = ReadAll(out_ / "trajectory_online.txt");
   ASSERT_EQ(Run({"--threads", "2"}).status, 0);
   EXPECT_EQ(ReadAll(out_ / "trajectory_online.txt"), one);
+}
+
+class FaultsWhileRunning : public testing::TownTest {
+ protected:
+  std::vector<std::string> Arguments(const std::string& out,
+                                     const std::vector<std::string>& more = {}) const {
+    return testing::RunArguments(config_, town_, folder_ / out, more);
+  }
+  Trajectory Poses(const std::string& out) const {
+    return ReadTrajectory(folder_ / out / "trajectory.txt", TrajectoryFormat::kTum);
+  }
+  void ExpectSameBytes(const char* a, const char* b) const {
+    for (const char* file : {"trajectory.txt", "loops.csv", "graph.g2o"})
+      EXPECT_EQ(ReadAll(folder_ / a / file), ReadAll(folder_ / b / file)) << file;
+  }
+  testing::ProcessResult InShell(const std::string& script, const std::string& out) const {
+    return testing::RunInShell(script, Arguments(out));
+  }
+
+  const fs::path town_ = testing::CopyOfTinyTown(folder_ / "town");
+};
+
+TEST_F(FaultsWhileRunning, ADayBetweenTwoFramesIsSaidAndTheRunGoesOn) {
+  std::istringstream times(testing::ReadAll(town_ / "times.txt"));
+  std::ostringstream moved;
+  double stamp_s = 0;
+  for (int i = 0; times >> stamp_s; ++i)
+    moved << std::fixed << std::setprecision(6) << stamp_s + (i < 15 ? 0 : 86400) << "\n";
+  testing::WriteAll(town_ / "times.txt", moved.str());
+  EXPECT_THAT(Done(testing::RunTutti(Arguments("out"))),
+              HasSubstr("frame 15 comes 86400 s after the one before it"));
+  EXPECT_EQ(Poses("out").size(), static_cast<std::size_t>(testing::kTinyFrames));
+}
+
+TEST_F(FaultsWhileRunning, AProcessThatIsStoppedForASecondGoesOnWithTheSameBytes) {
+  ASSERT_EQ(testing::RunTutti(Arguments("quiet")).status, 0);
+  Done(InShell(R"("$@" & run=$!; sleep 0.3; kill -STOP $run || exit 99; sleep 1; kill -CONT $run; wait $run)",
+               "held"));
+  ExpectSameBytes("held", "quiet");
+}
+
+// Waiting, writing checkpoints and keeping pace go by a clock that nobody can set.
+TEST_F(FaultsWhileRunning, AClockThatIsSetBackAgainAndAgainChangesNothing) {
+#ifdef TUTTI_SANITIZED
+  GTEST_SKIP() << "a sanitizer has functions of its own in these places";
+#endif
+  void* const module = dlopen(TUTTI_CLOCK_SET_BACK, RTLD_NOW);
+  ASSERT_NE(module, nullptr) << dlerror();
+  const auto clock = reinterpret_cast<std::time_t (*)(std::time_t*)>(dlsym(module, "time"));
+  const std::time_t first = clock(nullptr), second = clock(nullptr);
+  EXPECT_LT(second, first - 80000) << "the clock is not set back";
+  ASSERT_EQ(testing::RunTutti(Arguments("quiet")).status, 0);
+  Done(InShell("LD_PRELOAD='" TUTTI_CLOCK_SET_BACK "' \"$@\" --checkpoint 0.1 --follow 1", "set_back"));
+  ExpectSameBytes("set_back", "quiet");
+}
+
+TEST_F(FaultsWhileRunning, AFolderThatStallsIsWaitedFor) {
+  const fs::path later = folder_ / "later";
+  for (const char* camera : {"image_0", "image_1"}) {
+    fs::create_directories(later / camera);
+    for (int i = 20; i < testing::kTinyFrames; ++i) {
+      std::ostringstream name;
+      name << std::setw(6) << std::setfill('0') << i << ".png";
+      fs::rename(town_ / camera / name.str(), later / camera / name.str());
+    }
+  }
+  const std::string script =
+      "\"$@\" --follow 6 & run=$!; sleep 3; kill -0 $run || exit 99; for c in 1 0; do mv '" + later.string() +
+      "'/image_$c/* '" + town_.string() + "'/image_$c/; done; wait $run";
+  const std::string run = Done(InShell(script, "out"));
+  EXPECT_EQ(Poses("out").size(), static_cast<std::size_t>(testing::kTinyFrames)) << run;
 }
 
 }  // namespace

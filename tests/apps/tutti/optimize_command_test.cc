@@ -11,6 +11,8 @@
 namespace tutti {
 namespace {
 
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -21,14 +23,11 @@ class OptimizeCommand : public ::testing::Test {
  protected:
   testing::ProcessResult Optimize(const std::string& graph, const std::vector<std::string>& more = {}) const {
     testing::WriteAll(folder_ / "in.g2o", graph);
-    std::vector<std::string> arguments = {"optimize", (folder_ / "in.g2o").string(),
-                                          "--out",    (folder_ / "out.g2o").string(),
-                                          "--json",   (folder_ / "out.json").string()};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return testing::RunTutti(arguments);
+    return testing::RunTutti(
+        {"optimize", folder_ / "in.g2o", "--out", folder_ / "out.g2o", "--json", folder_ / "out.json"}, more);
   }
   std::string Out() const { return testing::ReadAll(folder_ / "out.g2o"); }
-  nlohmann::json Json() const { return nlohmann::json::parse(testing::ReadAll(folder_ / "out.json")); }
+  nlohmann::json Json() const { return testing::ReadJson(folder_ / "out.json"); }
   void ExpectRefused(const std::string& graph, const std::string& why) const {
     const testing::ProcessResult run = Optimize(graph);
     EXPECT_EQ(run.status, 1) << why;
@@ -57,12 +56,9 @@ TEST_F(OptimizeCommand, RefusesWhatIsWrongWithTheLineInWhichItIs) {
 TEST_F(OptimizeCommand, SaysWhichPartsNoEdgeConnectsAndWhatHoldsEach) {
   const std::string apart =
       "VERTEX_SE2 10 5 5 0\nVERTEX_SE2 11 7 5 0\nEDGE_SE2 10 11 1 0 0 1 0 0 1 0 1\nFIX 11\n";
-  const testing::ProcessResult run =
-      Optimize(std::string(kVertices) + "VERTEX_SE2 20 7 7 0\n" + kEdge + apart);
-  EXPECT_EQ(run.status, 0);
-  EXPECT_THAT(run.output,
-              HasSubstr("3 parts that no edge connects; each is held at one node: 0 (2) 20 (1) 11 (2)"));
-  EXPECT_THAT(run.output, HasSubstr("1 vertices have no edge and stay as they are"));
+  const std::string run = Done(Optimize(std::string(kVertices) + "VERTEX_SE2 20 7 7 0\n" + kEdge + apart));
+  EXPECT_THAT(run, HasSubstr("3 parts that no edge connects; each is held at one node: 0 (2) 20 (1) 11 (2)"));
+  EXPECT_THAT(run, HasSubstr("1 vertices have no edge and stay as they are"));
   const nlohmann::json expected = {
       {{"anchor", 0}, {"nodes", 2}}, {{"anchor", 20}, {"nodes", 1}}, {{"anchor", 11}, {"nodes", 2}}};
   EXPECT_EQ(Json()["components"], expected);
@@ -72,10 +68,8 @@ TEST_F(OptimizeCommand, SaysWhichPartsNoEdgeConnectsAndWhatHoldsEach) {
 }
 
 TEST_F(OptimizeCommand, PlacesNodesOfEdgesWithoutAVertexAndWarns) {
-  const testing::ProcessResult run =
-      Optimize(std::string(kVertices) + kEdge + "EDGE_SE2 1 9 1 0 0 1 0 0 1 0 1\n");
-  EXPECT_EQ(run.status, 0);
-  EXPECT_THAT(run.output, HasSubstr("1 nodes of edges have no vertex"));
+  EXPECT_THAT(Done(Optimize(std::string(kVertices) + kEdge + "EDGE_SE2 1 9 1 0 0 1 0 0 1 0 1\n")),
+              HasSubstr("1 nodes of edges have no vertex"));
   EXPECT_THAT(Out(), HasSubstr("VERTEX_SE2 9 2 0 0\n"));
 }
 
@@ -87,23 +81,21 @@ TEST_F(OptimizeCommand, CountsEdgesThatAreGivenTwiceTwice) {
 
 TEST_F(OptimizeCommand, SaysWhichStartItTook) {
   const std::string loop = "EDGE_SE2 0 9 2 0.1 0 1 0 0 1 0 1\n";
-  const testing::ProcessResult run = Optimize(
-      kVertices + std::string(kEdge) + "EDGE_SE2 1 9 1 0 0.2 1 0 0 1 0 1\n" + loop, {"--init", "chordal"});
-  EXPECT_EQ(run.status, 0) << run.output;
-  EXPECT_THAT(run.output, HasSubstr("from the chordal optimum: "));
-  EXPECT_THAT(run.output, HasSubstr(", taken"));
-  EXPECT_THAT(run.output, HasSubstr("from the chordal relaxation: "));
+  const std::string run = Done(Optimize(
+      kVertices + std::string(kEdge) + "EDGE_SE2 1 9 1 0 0.2 1 0 0 1 0 1\n" + loop, {"--init", "chordal"}));
+  EXPECT_THAT(run, HasSubstr("from the chordal optimum: "));
+  EXPECT_THAT(run, HasSubstr(", taken"));
+  EXPECT_THAT(run, HasSubstr("from the chordal relaxation: "));
   EXPECT_EQ(Json()["start"], "chordal optimum");
   EXPECT_EQ(Json()["starts"].size(), 2u);
 }
 
 TEST_F(OptimizeCommand, SolvesLandmarksAndPriorsAndWritesThemBack) {
   const std::string seen = "VERTEX_XY 9 0 0\nEDGE_SE2_XY 0 9 2 1 1 0 1\nEDGE_SE2_XY 1 9 1 1 1 0 1\n";
-  const testing::ProcessResult run =
-      Optimize(std::string(kVertices) + kEdge + seen + "EDGE_PRIOR_SE2 0 5 0 0 1 0 0 1 0 1\n");
-  EXPECT_EQ(run.status, 0) << run.output;
-  EXPECT_THAT(run.output, HasSubstr("2 poses in SE(2), 1 edges (0 loops)"));
-  EXPECT_THAT(run.output, HasSubstr("1 landmarks; 3 measurements of landmarks and priors"));
+  const std::string run =
+      Done(Optimize(std::string(kVertices) + kEdge + seen + "EDGE_PRIOR_SE2 0 5 0 0 1 0 0 1 0 1\n"));
+  EXPECT_THAT(run, HasSubstr("2 poses in SE(2), 1 edges (0 loops)"));
+  EXPECT_THAT(run, HasSubstr("1 landmarks; 3 measurements of landmarks and priors"));
   const PoseGraph out = ReadG2o(folder_ / "out.g2o").graph;
   EXPECT_NEAR(out.Node(0).pose.translation.x(), 5, 1e-9);
   EXPECT_LT((out.landmarks().at(0).position - Eigen::Vector3d(7, 1, 0)).norm(), 1e-9);
@@ -116,32 +108,23 @@ TEST_F(OptimizeCommand, RefusesTagsThatItDoesNotKnowUnlessToldToIgnoreThem) {
   const std::string graph = std::string(kVertices) + kEdge + "EDGE_RANGE 0 1 3 1\n";
   ExpectRefused(graph,
                 "4: this line has the first of the tags that tutti does not know: EDGE_RANGE (1 line)");
-  const testing::ProcessResult run = Optimize(graph, {"--ignore-unknown"});
-  EXPECT_EQ(run.status, 0) << run.output;
-  EXPECT_THAT(run.output, HasSubstr("in.g2o:4: unknown tag 'EDGE_RANGE', 1 line ignored"));
+  EXPECT_THAT(Done(Optimize(graph, {"--ignore-unknown"})),
+              HasSubstr("in.g2o:4: unknown tag 'EDGE_RANGE', 1 line ignored"));
   EXPECT_EQ(Json()["ignored_lines"], 1);
 }
 
 TEST_F(OptimizeCommand, TreatsBadInformationAsItIsTold) {
   const std::string bad = "EDGE_SE2 0 1 3 0 0 1 2 0 1 0 1\n", good = kVertices + std::string(kEdge);
   const std::string text = good + bad + bad;
-  const testing::ProcessResult refused = Optimize(text);
-  EXPECT_EQ(refused.status, 1);
-  EXPECT_THAT(refused.output, HasSubstr("it is the first of 2 of 3 edges"));
+  ExpectRefusal(Optimize(text), {"it is the first of 2 of 3 edges"});
   for (const char* how : {"project", "diagonal", "skip"}) {
-    const testing::ProcessResult run = Optimize(text, {"--bad-information", how});
-    EXPECT_EQ(run.status, 0) << run.output;
-    EXPECT_THAT(run.output, HasSubstr("in.g2o:4: 2 of 3 edges")) << how;
+    EXPECT_THAT(Done(Optimize(text, {"--bad-information", how})), HasSubstr("in.g2o:4: 2 of 3 edges")) << how;
     EXPECT_EQ(Json()["bad_information"]["treatment"], how);
     EXPECT_EQ(Json()["bad_information"]["edges"], 2);
     EXPECT_EQ(Json()["bad_information"]["skipped"], std::string(how) == "skip" ? 2 : 0);
   }
-  const testing::ProcessResult unknown = Optimize(good, {"--bad-information", "projekt"});
-  EXPECT_NE(unknown.status, 0);
-  EXPECT_THAT(unknown.output, HasSubstr("did you mean 'project'?"));
-  const testing::ProcessResult apart = Optimize(kVertices + bad, {"--bad-information", "skip"});
-  EXPECT_EQ(apart.status, 1);
-  EXPECT_THAT(apart.output, HasSubstr("falls into 2 pieces"));
+  ExpectRefusal(Optimize(good, {"--bad-information", "projekt"}), {"did you mean 'project'?"});
+  ExpectRefusal(Optimize(kVertices + bad, {"--bad-information", "skip"}), {"falls into 2 pieces"});
 }
 
 }  // namespace

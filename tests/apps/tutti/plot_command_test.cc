@@ -16,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ReadAll;
@@ -44,15 +45,9 @@ class PlotCommand : public ::testing::Test {
   }
   testing::ProcessResult Plot(const std::string& what, const std::vector<std::string>& files,
                               const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"plot",
-                                          "--reference",
-                                          (folder_ / "reference.txt").string(),
-                                          "--estimate",
-                                          (folder_ / "good.txt").string(),
-                                          (folder_ / "bad.txt").string(),
-                                          "--what",
-                                          what,
-                                          "--out"};
+    std::vector<std::string> arguments = {"plot", "--reference", folder_ / "reference.txt"};
+    arguments.insert(arguments.end(), {"--estimate", folder_ / "good.txt", folder_ / "bad.txt"});
+    arguments.insert(arguments.end(), {"--what", what, "--out"});
     for (const std::string& file : files) arguments.push_back((folder_ / file).string());
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunTutti(arguments);
@@ -62,8 +57,7 @@ class PlotCommand : public ::testing::Test {
 
 TEST_F(PlotCommand, EveryKindIsDrawnAsSvgAndPng) {
   for (const std::string what : {"trajectory", "error", "rpe"}) {
-    const auto run = Plot(what, {what + ".svg", what + ".png"});
-    ASSERT_EQ(run.status, 0) << run.output;
+    Done(Plot(what, {what + ".svg", what + ".png"}));
     const std::string svg = ReadAll(folder_ / (what + ".svg"));
     EXPECT_THAT(svg, AllOf(HasSubstr("good.txt"), HasSubstr("bad.txt"), HasSubstr("[m]"), HasSubstr("</svg>"),
                            HasSubstr(kBlue), HasSubstr(kVermilion), Not(HasSubstr("nan"))));
@@ -77,8 +71,7 @@ TEST_F(PlotCommand, WithoutAReferenceTheFilesAreDrawnAsTheyAre) {
   const std::string good = (folder_ / "good.txt").string(), bad = (folder_ / "bad.txt").string();
   for (const std::string what : {"trajectory", "xyz", "rpy", "speed"}) {
     const std::string svg = (folder_ / (what + ".svg")).string();
-    const auto run = RunTutti({"plot", good, bad, "--what", what, "--out", svg});
-    ASSERT_EQ(run.status, 0) << run.output;
+    Done(RunTutti({"plot", good, bad, "--what", what, "--out", svg}));
     EXPECT_THAT(ReadAll(svg), AllOf(HasSubstr("\ngood.txt\n"), HasSubstr("\nbad.txt\n"), HasSubstr("</svg>"),
                                     Not(HasSubstr("\nreference\n")), Not(HasSubstr("nan"))));
   }
@@ -97,8 +90,7 @@ TEST_F(PlotCommand, OverTimeTheReferenceIsDrawnToo) {
 
 TEST_F(PlotCommand, ErrorsAreDrawnOnTheMapAndAsDistributions) {
   for (const std::string what : {"error-map", "box", "violin"}) {
-    const auto run = Plot(what, {what + ".svg", what + ".png"});
-    ASSERT_EQ(run.status, 0) << run.output;
+    Done(Plot(what, {what + ".svg", what + ".png"}));
     EXPECT_THAT(ReadAll(folder_ / (what + ".svg")), AllOf(HasSubstr("[m]"), Not(HasSubstr("nan"))));
     EXPECT_FALSE(cv::imread((folder_ / (what + ".png")).string()).empty());
   }

@@ -11,13 +11,14 @@
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
-#include "tests/support/test_data.h"
 
 namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
@@ -27,36 +28,31 @@ constexpr const char* kResults[] = {
     "trajectory.txt", "trajectory_odometry.txt", "trajectory_online.txt", "keyframes.txt", "loops.csv",
     "graph.g2o"};
 
-class Resume : public ::testing::Test {
+class Resume : public testing::TownTest {
  protected:
   std::vector<std::string> Arguments(const fs::path& out, const std::vector<std::string>& more) const {
-    return testing::RunArguments(testing::TinyConfig(folder_), testing::TinyTown(), out, more);
+    return testing::RunArguments(config_, testing::TinyTown(), out, more);
   }
   // Killed after so many seconds, unless it is at its end before.
   static testing::ProcessResult KilledAfter(double seconds, const std::vector<std::string>& arguments) {
-    std::vector<std::string> words = {
-        "-c", "exec timeout -s KILL " + std::to_string(seconds) + " \"$0\" \"$@\"", TUTTI_EXECUTABLE};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    return testing::RunProgramAndSignal("/bin/sh", words, "", 0);
+    return testing::RunInShell("exec timeout -s KILL " + std::to_string(seconds) + " \"$@\"", arguments);
   }
   static void ExpectTheSame(const fs::path& a, const fs::path& b) {
     for (const char* name : kResults) EXPECT_EQ(ReadAll(a / name) == ReadAll(b / name), true) << name;
   }
-  const fs::path folder_ = testing::FreshFolder(), out_ = folder_ / "out", whole_ = folder_ / "whole";
+  const fs::path whole_ = folder_ / "whole";
 };
 
 TEST_F(Resume, AfterThirtyKillsAtAnyMomentTheResultsAreTheSame) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   const fs::path town = testing::GeneratedDataset(options);
-  const std::vector<std::string> first = {"run",         "--config",     (town / "config.yaml").string(),
-                                          "--out",       out_.string(),  "--dataset",
-                                          town.string(), "--checkpoint", "0",
-                                          "--no-report"};
+  const std::vector<std::string> first = {
+      "run",       "--config", town / "config.yaml", "--out", out_,
+      "--dataset", town,       "--checkpoint",       "0",     "--no-report"};
   std::vector<std::string> never = first;
   never[4] = whole_.string();
-  const auto whole = RunTutti(never);
-  ASSERT_EQ(whole.status, 0) << whole.output;
-  ASSERT_GT(nlohmann::json::parse(ReadAll(whole_ / "summary.json"))["loops"]["accepted"], 0);
+  Done(RunTutti(never));
+  ASSERT_GT(testing::ReadJson(whole_ / "summary.json")["loops"]["accepted"], 0);
 
   std::mt19937 random(1);
   auto run = KilledAfter(1.5, first);
@@ -66,14 +62,14 @@ TEST_F(Resume, AfterThirtyKillsAtAnyMomentTheResultsAreTheSame) {
   for (; run.status != 0 && kills < 30; ++kills) {
     ASSERT_THAT(run.status, ::testing::AnyOf(137, 128 + SIGKILL)) << run.output;
     const double seconds = 0.05 + 1e-3 * static_cast<double>(random() % 1200);
-    run = KilledAfter(seconds, {"run", "--resume", out_.string(), "--no-report"});
+    run = KilledAfter(seconds, {"run", "--resume", out_, "--no-report"});
   }
-  if (run.status != 0) run = RunTutti({"run", "--resume", out_.string(), "--no-report"});
+  if (run.status != 0) run = RunTutti({"run", "--resume", out_, "--no-report"});
   ASSERT_EQ(run.status, 0) << run.output;
   EXPECT_GT(kills, 3);
   ExpectTheSame(out_, whole_);
   EXPECT_FALSE(fs::exists(out_ / "checkpoint.tutti"));
-  EXPECT_TRUE(nlohmann::json::parse(ReadAll(out_ / "summary.json")).contains("resumed_from_frame"));
+  EXPECT_TRUE(testing::ReadJson(out_ / "summary.json").contains("resumed_from_frame"));
   std::printf("  %d kills\n", kills);
 }
 
@@ -83,8 +79,7 @@ TEST_F(Resume, AnInterruptedRunSaysHowToGoOn) {
   EXPECT_EQ(run.status, 130) << run.output;
   EXPECT_THAT(run.output, HasSubstr("tutti run --resume " + out_.string()));
   ASSERT_TRUE(fs::exists(out_ / "checkpoint.tutti"));
-  const auto resumed = RunTutti({"run", "--resume", out_.string()});
-  EXPECT_EQ(resumed.status, 0) << resumed.output;
+  Done(RunTutti({"run", "--resume", out_}));
   ExpectTheSame(out_, whole_);
   EXPECT_TRUE(fs::exists(out_ / "report.html") || fs::exists(out_ / "report.json"));
 }
@@ -92,35 +87,29 @@ TEST_F(Resume, AnInterruptedRunSaysHowToGoOn) {
 TEST_F(Resume, AFinishedRunIsLeftAloneAndWhereThereIsNoneThatIsSaid) {
   ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5"})).status, 0);
   const std::string before = ReadAll(out_ / "summary.json");
-  const auto finished = RunTutti({"run", "--resume", out_.string()});
+  const auto finished = RunTutti({"run", "--resume", out_});
   EXPECT_EQ(finished.status, 0);
   EXPECT_THAT(finished.output, HasSubstr("has finished"));
   EXPECT_EQ(ReadAll(out_ / "summary.json"), before);
-  const auto nothing = RunTutti({"run", "--resume", (folder_ / "absent").string()});
-  EXPECT_EQ(nothing.status, 1);
-  EXPECT_THAT(nothing.output, AllOf(HasSubstr("no checkpoint.tutti"), HasSubstr("--config")));
+  ExpectRefusal(RunTutti({"run", "--resume", folder_ / "absent"}), {"no checkpoint.tutti", "--config"});
 }
 
 TEST_F(Resume, ADamagedCheckpointAndOptionsThatItHasAreRefused) {
   testing::RunTuttiAndSignal(Arguments(out_, {"--checkpoint", "0"}), " 50%", SIGKILL);
   const fs::path checkpoint = out_ / "checkpoint.tutti";
   ASSERT_TRUE(fs::exists(checkpoint));
-  const auto other = RunTutti({"run", "--resume", out_.string(), "--seed", "3"});
-  EXPECT_EQ(other.status, 1);
-  EXPECT_THAT(other.output, HasSubstr("--seed can't be given with --resume"));
+  ExpectRefusal(RunTutti({"run", "--resume", out_, "--seed", "3"}), {"--seed can't be given with --resume"});
   std::string bytes = ReadAll(checkpoint);
   bytes[bytes.size() / 2] ^= 1;
   testing::WriteAll(checkpoint, bytes);
-  const auto damaged = RunTutti({"run", "--resume", out_.string()});
-  EXPECT_EQ(damaged.status, 1);
-  EXPECT_THAT(damaged.output, AllOf(HasSubstr(checkpoint.string()), HasSubstr("is damaged")));
+  ExpectRefusal(RunTutti({"run", "--resume", out_}), {checkpoint, "is damaged"});
 }
 
 // A copy without hidden files has no mark of tutti but the checkpoint.
 TEST_F(Resume, ACopiedFolderGoesOnAndNothingElsewhereIsWritten) {
   const fs::path elsewhere = folder_ / "elsewhere.tutti", memory = folder_ / "memory.ltm",
                  copy = folder_ / "copy";
-  testing::RunTuttiAndSignal(Arguments(out_, {"--checkpoint", "0", "--save-map", elsewhere.string(), "--set",
+  testing::RunTuttiAndSignal(Arguments(out_, {"--checkpoint", "0", "--save-map", elsewhere, "--set",
                                               "loops.ltm_file=" + memory.string(), "--no-report"}),
                              " 50%", SIGKILL);
   ASSERT_TRUE(fs::exists(out_ / "checkpoint.tutti"));
@@ -131,19 +120,15 @@ TEST_F(Resume, ACopiedFolderGoesOnAndNothingElsewhereIsWritten) {
   const auto linked = folder_ / "linked";
   fs::create_directory(linked);
   fs::create_symlink(out_ / "checkpoint.tutti", linked / "checkpoint.tutti");
-  const auto refused = RunTutti({"run", "--resume", linked.string()});
-  EXPECT_EQ(refused.status, 1);
-  EXPECT_THAT(refused.output, HasSubstr("is a link"));
-  const auto resumed = RunTutti({"run", "--resume", copy.string(), "--no-report"});
-  EXPECT_EQ(resumed.status, 0) << resumed.output;
+  ExpectRefusal(RunTutti({"run", "--resume", linked}), {"is a link"});
+  const std::string resumed = Done(RunTutti({"run", "--resume", copy, "--no-report"}));
   EXPECT_TRUE(fs::exists(copy / "map.tutti"));
   EXPECT_FALSE(fs::exists(elsewhere));
   EXPECT_FALSE(fs::exists(memory));
-  EXPECT_THAT(resumed.output, AllOf(HasSubstr("--save-map " + elsewhere.string()),
-                                    HasSubstr("--set loops.ltm_file=" + memory.string())));
-  const auto told = RunTutti({"run", "--resume", out_.string(), "--no-report", "--save-map",
-                              elsewhere.string(), "--set", "loops.ltm_file=" + memory.string()});
-  EXPECT_EQ(told.status, 0) << told.output;
+  EXPECT_THAT(resumed, AllOf(HasSubstr("--save-map " + elsewhere.string()),
+                             HasSubstr("--set loops.ltm_file=" + memory.string())));
+  Done(RunTutti({"run", "--resume", out_, "--no-report", "--save-map", elsewhere, "--set",
+                 "loops.ltm_file=" + memory.string()}));
   EXPECT_TRUE(fs::exists(elsewhere));
   EXPECT_TRUE(fs::exists(memory));
   ExpectTheSame(out_, copy);
@@ -155,7 +140,7 @@ TEST_F(Resume, EachRunLeavesAMapUnlessToldNotTo) {
   ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5", "--no-map"})).status, 0);
   EXPECT_FALSE(fs::exists(out_ / "map.tutti"));
   const fs::path elsewhere = folder_ / "my.map";
-  ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5", "--save-map", elsewhere.string()})).status, 0);
+  ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5", "--save-map", elsewhere})).status, 0);
   EXPECT_FALSE(fs::exists(out_ / "map.tutti"));
   EXPECT_TRUE(fs::exists(elsewhere));
 }
@@ -163,21 +148,17 @@ TEST_F(Resume, EachRunLeavesAMapUnlessToldNotTo) {
 TEST_F(Resume, MapInfoTellsWhatIsInAMapAndChecksIt) {
   ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5"})).status, 0);
   const fs::path map = out_ / "map.tutti";
-  const auto text = RunTutti({"map", "info", map.string(), "--check"});
-  EXPECT_EQ(text.status, 0) << text.output;
-  EXPECT_THAT(text.output,
+  EXPECT_THAT(Done(RunTutti({"map", "info", map, "--check"})),
               AllOf(HasSubstr("keyframes"), HasSubstr("stereo"), HasSubstr("checksums are right")));
-  const auto info = nlohmann::json::parse(RunTutti({"map", "info", map.string(), "--json"}).output);
+  const auto info = nlohmann::json::parse(RunTutti({"map", "info", map, "--json"}).output);
   EXPECT_EQ(info["frames"], 5);
   EXPECT_GT(info["landmarks"], 50);
   EXPECT_EQ(info["run"]["dataset"], testing::TinyTown().string());
   std::string bytes = ReadAll(map);
   bytes[bytes.size() / 2] ^= 1;
   testing::WriteAll(map, bytes);
-  EXPECT_EQ(RunTutti({"map", "info", map.string()}).status, 0) << "the first section is as it was";
-  const auto damaged = RunTutti({"map", "info", map.string(), "--check"});
-  EXPECT_EQ(damaged.status, 1);
-  EXPECT_THAT(damaged.output, HasSubstr("a checksum is wrong"));
+  EXPECT_EQ(RunTutti({"map", "info", map}).status, 0) << "the first section is as it was";
+  ExpectRefusal(RunTutti({"map", "info", map, "--check"}), {"a checksum is wrong"});
 }
 
 }  // namespace

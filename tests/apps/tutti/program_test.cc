@@ -1,4 +1,5 @@
-// `tutti` itself is small and starts quickly; the commands that read images are in tutti-images.
+// `tutti` itself is small and starts quickly; the commands that read images are in tutti-images. --help is as
+// wide as the terminal.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,14 +7,18 @@
 #include <filesystem>
 #include <regex>
 
+#include "apps/tutti/help.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/test_data.h"
+#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Done;
+using testing::ExpectRefusal;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::RunProgramAndSignal;
@@ -46,11 +51,10 @@ TEST(Start, TheProgramLoadsNoImageReaders) {
 }
 
 TEST(Start, EveryCommandOfTheHelpExplainsItselfInEitherWay) {
-  const auto all = RunTutti({"help"});
-  EXPECT_EQ(all.status, 0);
-  EXPECT_EQ(all.output, RunTutti({"--help"}).output);
+  const std::string all = Done(RunTutti({"help"}));
+  EXPECT_EQ(all, RunTutti({"--help"}).output);
   const std::regex line("\n  ([a-z-]+) +[^ \n]");
-  const std::string commands = all.output.substr(all.output.find("Subcommands:"));
+  const std::string commands = all.substr(all.find("Subcommands:"));
   int count = 0;
   for (std::sregex_iterator it(commands.begin(), commands.end(), line), end; it != end; ++it) {
     const std::string name = (*it)[1];
@@ -66,10 +70,8 @@ TEST(Start, EveryCommandOfTheHelpExplainsItselfInEitherWay) {
 
 TEST(Start, AnUnknownCommandIsRefusedWithTheNearest) {
   for (const std::string word : {"optimise", "rum"}) {
-    const auto run = RunTutti({word});
-    EXPECT_EQ(run.status, 1);
-    EXPECT_THAT(run.output, AllOf(HasSubstr("there is no command '" + word + "'"),
-                                  HasSubstr(word == "rum" ? "'run'" : "'optimize'")));
+    ExpectRefusal(RunTutti({word}),
+                  {"there is no command '" + word + "'", word == "rum" ? "'run'" : "'optimize'"});
   }
   EXPECT_EQ(RunTutti({}).status, 1);
 }
@@ -96,6 +98,58 @@ TEST_F(HandOver, CtrlCReachesTheOtherProgramAlone) {
   const auto run = RunProgramAndSignal(tutti_, {"run"}, "ready", SIGINT);
   EXPECT_EQ(run.status, 42);
   EXPECT_EQ(run.output, "ready\nstopped\n");
+}
+
+std::size_t SpacesBefore(const std::string& line) {
+  return std::min(line.find_first_not_of(' '), line.size());
+}
+
+TEST(Help, OfEveryCommandFitsAPipesColumns) {
+  for (const char* name :
+       {"", "run", "close", "localize", "merge", "map", "export", "calibrate-check", "evaluate", "convert",
+        "plot", "compare", "collect", "loops", "compare-loops", "optimize", "generate", "demo"}) {
+    std::vector<std::string> words = {name, "--help"};
+    if (words[0].empty()) words.erase(words.begin());
+    const std::string run = Done(RunTutti(words));
+    const std::vector<std::string> lines = SplitText(run, "\n");
+    ASSERT_GT(lines.size(), 3u) << name;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      EXPECT_LE(lines[i].size(), 80u) << name << ": " << lines[i];
+      if (i == 0 || SpacesBefore(lines[i]) < 20 || SpacesBefore(lines[i]) != SpacesBefore(lines[i - 1]))
+        continue;
+      // A paragraph goes on: its next word had no room in the line before.
+      const std::string word = SplitText(lines[i], " ").front();
+      EXPECT_GT(lines[i - 1].size() + 1 + word.size(), 80u) << name << ": " << lines[i - 1];
+    }
+  }
+}
+
+TEST(Help, OfTheConfigurationFitsAPipesColumns) {
+  const std::string run = Done(RunTutti({"run", "--help-config", "--advanced"}));
+  for (const std::string& line : SplitText(run, "\n")) {
+    const bool commented = line.find("# ") != std::string::npos;
+    EXPECT_LE(commented ? line.size() : 0, 80u) << line;
+  }
+}
+
+CLI::App* HelpOf(CLI::App& app, std::size_t columns) {
+  static std::string value;
+  app.formatter(std::make_shared<cli::WrappedHelp>(columns));
+  CLI::App* command = app.add_subcommand("walk", "goes from one place to another, and back if it must");
+  command->add_option("--way", value,
+                      "the way that is gone, over hill and dale and whatever else there may be");
+  return command;
+}
+
+TEST(Help, UsesTheWholeTerminal) {
+  CLI::App wide("example", "example"), narrow("example", "example");
+  EXPECT_THAT(
+      HelpOf(wide, 200)->help(),
+      HasSubstr("--way TEXT              the way that is gone, over hill and dale and whatever else there "
+                "may be\n"));
+  const std::string text = HelpOf(narrow, 40)->help();
+  for (const std::string& line : SplitText(text, "\n")) EXPECT_LE(line.size(), 40u) << line;
+  EXPECT_THAT(text, HasSubstr("  --way TEXT\n      the way that is gone, over hill\n"));
 }
 
 }  // namespace

@@ -1,13 +1,10 @@
-#include "apps/tutti/number_checks.h"
+#include "apps/tutti/options.h"
 
 #include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <string>
 #include <system_error>
-
-#include "tutti/core/text.h"
 
 namespace tutti::cli {
 namespace {
@@ -27,15 +24,11 @@ std::string RefuseReal(const std::string& text) {
 }
 
 template <class Whole>
-bool Overflows(const std::string& text) {
-  Whole value = 0;
-  const auto [last, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return last == text.data() + text.size() && error == std::errc::result_out_of_range;
-}
-
-template <class Whole>
 std::string RefuseWhole(const std::string& text) {
-  if (!Overflows<Whole>(text.rfind('+', 0) == 0 ? text.substr(1) : text)) return {};
+  const char* end = text.data() + text.size();
+  Whole value = 0;
+  const auto [last, error] = std::from_chars(text.data() + (text.rfind('+', 0) == 0 ? 1 : 0), end, value);
+  if (last != end || error != std::errc::result_out_of_range) return {};
   const long long least = std::numeric_limits<Whole>::min();
   return "'" + text + "' does not fit; give a whole number from " + std::to_string(least) + " to " +
          std::to_string(std::numeric_limits<Whole>::max());
@@ -48,20 +41,19 @@ std::string RefuseThreads(const std::string& text) {
          " threads; as many as cores are enough";
 }
 
-CLI::Validator CheckedBy(std::string (*refuse)(const std::string&)) {
-  return CLI::Validator([refuse](std::string& text) { return refuse(text); }, "");
-}
-
 }  // namespace
 
 void RefuseAbsurdNumbers(CLI::App& command) {
   for (CLI::Option* option : command.get_options()) {
+    const auto refuse = [option](std::string (*problem)(const std::string&)) {
+      option->check(CLI::Validator([problem](std::string& text) { return problem(text); }, ""));
+    };
     const std::string type = option->get_type_name();
     const std::string kind = type.substr(0, type.find(':'));
-    if (kind == "FLOAT" || kind == "SECONDS") option->check(CheckedBy(RefuseReal));
-    if (kind == "INT") option->check(CheckedBy(RefuseWhole<int>));
-    if (kind == "UINT") option->check(CheckedBy(RefuseWhole<std::uint64_t>));
-    if (option->check_lname("threads")) option->check(CheckedBy(RefuseThreads));
+    if (kind == "FLOAT" || kind == "SECONDS") refuse(RefuseReal);
+    if (kind == "INT") refuse(RefuseWhole<int>);
+    if (kind == "UINT") refuse(RefuseWhole<std::uint64_t>);
+    if (option->check_lname("threads")) refuse(RefuseThreads);
   }
 }
 

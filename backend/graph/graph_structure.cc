@@ -81,4 +81,11 @@ GraphStructure HeldByPriors(GraphStructure structure, const PoseGraph& graph) {
   return structure;
 }
 
+std::vector<int> NumberUnknowns(const std::vector<bool>& constant, int& count) {
+  std::vector<int> out;
+  count = 0;
+  for (const bool held : constant) out.push_back(held ? -1 : count++);
+  return out;
+}
+
 }  // namespace tutti::internal

@@ -1,10 +1,8 @@
 // How far off may an edge be that is not in the graph yet? Private to the back end.
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/SparseCore>
 #include <cstddef>
-#include <vector>
+#include <memory>
 
 #include "backend/solver/graph_problem.h"
 
@@ -21,36 +19,16 @@ struct PredictedEdge {
 /// the graph rises by if the edge joins it (the innovation of a Kalman filter). L^-1 J^T of the Cholesky
 /// factor H = L L^T is enough, and has entries only on the ways of the edge's ends to the root of the
 /// elimination tree.
-template <int N>
 class EdgePrediction {
  public:
-  explicit EdgePrediction(const GraphProblem<N>& problem);
+  virtual ~EdgePrediction() = default;
 
   /// Reads the weights and the poses. False if the edges of weight 1 do not hold the graph together.
-  bool Update();
-
-  PredictedEdge Of(std::size_t e);
-
- private:
-  using Square = Eigen::Matrix<double, N, N>;
-  using Row = Eigen::Matrix<double, 1, N>;
-  static std::size_t At(int k) { return static_cast<std::size_t>(k); }
-
-  /// The way from a column to the root, as far as it is new.
-  void ClimbFrom(int column, std::vector<int>& columns);
-  void Eliminate(int column);
-
-  const GraphProblem<N>& problem_;
-  int size_ = 0;  // before row_, which sets it
-  std::vector<int> row_;
-  Eigen::SparseMatrix<double> L_;  // the factor, permuted
-  Eigen::VectorXi place_;          // of each row of H in L
-  std::vector<Row> solution_;      // zero between calls
-  std::vector<bool> reached_;      // false between calls
+  virtual bool Update() = 0;
+  virtual PredictedEdge Of(std::size_t e) = 0;
 };
 
-extern template class EdgePrediction<3>;
-extern template class EdgePrediction<6>;
-extern template class EdgePrediction<7>;
+/// `problem` outlives it.
+std::unique_ptr<EdgePrediction> MakeEdgePrediction(const GraphProblem& problem);
 
 }  // namespace tutti::internal

@@ -120,6 +120,20 @@ double PositionError(const PoseGraph& graph, const std::vector<Similarity>& trut
   return std::sqrt(sum / static_cast<double>(graph.nodes().size()));
 }
 
+std::vector<Similarity> PosesOf(const PoseGraph& graph) {
+  std::vector<Similarity> poses;
+  for (const PoseGraphNode& node : graph.nodes()) poses.push_back(node.pose);
+  return poses;
+}
+
+ProblemAtPoses::ProblemAtPoses(PoseGraph of, const PoseGraphOptions& with)
+    : graph(std::move(of)),
+      options(with),
+      structure(internal::AnalyseGraph(graph)),
+      problem(internal::MakeGraphProblem(graph, structure, options)) {
+  problem->SetPoses(PosesOf(graph));
+}
+
 Eigen::MatrixXd DenseInverse(const Eigen::MatrixXd& matrix) { return matrix.inverse(); }
 
 }  // namespace tutti::testing

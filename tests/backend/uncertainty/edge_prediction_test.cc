@@ -4,14 +4,11 @@
 
 #include <Eigen/LU>
 
+#include "backend/solver/weighted_graph.h"
 #include "tests/backend/graph/synthetic_graph.h"
 
 namespace tutti {
 namespace {
-
-using internal::EdgePrediction;
-using internal::GraphProblem;
-using internal::PredictedEdge;
 
 // A graph at its optimum without its last edge, which is off by a little.
 PoseGraph WithNewcomer(GraphKind kind) {
@@ -23,63 +20,46 @@ PoseGraph WithNewcomer(GraphKind kind) {
   return graph;
 }
 
-template <int N>
-GraphProblem<N> ProblemAt(const PoseGraph& graph, const internal::GraphStructure& structure,
-                          const PoseGraphOptions& options) {
-  GraphProblem<N> problem(graph, structure, options);
-  std::vector<Similarity> poses;
-  for (const PoseGraphNode& node : graph.nodes()) poses.push_back(node.pose);
-  problem.SetPoses(poses);
-  problem.SetWeight(graph.edges().size() - 1, 0);
-  return problem;
-}
-
-template <int N>
-void ExpectTheRiseOfTheCost(GraphKind kind) {
-  const PoseGraph graph = WithNewcomer(kind);
-  const internal::GraphStructure structure = internal::AnalyseGraph(graph);
-  const PoseGraphOptions options;
-  const std::size_t last = graph.edges().size() - 1;
-  const GraphProblem<N> problem = ProblemAt<N>(graph, structure, options);
-  EdgePrediction<N> prediction(problem);
-  ASSERT_TRUE(prediction.Update());
-  const PredictedEdge predicted = prediction.Of(last);
-  PoseGraph with = graph;
-  const double rise = PoseGraphOptimizer().Optimize(with).costs.chi2log -
-                      (EvaluateCosts(graph).chi2log - problem.EdgeChi2(last));
-  EXPECT_NEAR(predicted.chi2, rise, 0.02 * rise) << ToString(kind);
-  EXPECT_LT(predicted.chi2, problem.EdgeChi2(last));
-  EXPECT_EQ(prediction.Of(last).chi2, predicted.chi2) << "what one call leaves behind spoils the next";
-}
-
 TEST(EdgePrediction, ChiSquareIsWhatTheCostRisesByWhenTheEdgeJoins) {
-  ExpectTheRiseOfTheCost<3>(GraphKind::kSE2);
-  ExpectTheRiseOfTheCost<6>(GraphKind::kSE3);
-  ExpectTheRiseOfTheCost<7>(GraphKind::kSim3);
+  for (const GraphKind kind : testing::kGraphKinds) {
+    const PoseGraph graph = WithNewcomer(kind);
+    const std::size_t last = graph.edges().size() - 1;
+    const testing::ProblemAtPoses made(graph);
+    made.problem->SetWeight(last, 0);
+    const auto prediction = internal::MakeEdgePrediction(*made.problem);
+    ASSERT_TRUE(prediction->Update());
+    const internal::PredictedEdge predicted = prediction->Of(last);
+    PoseGraph with = graph;
+    const double chi2 = made.problem->EdgeChi2(last);
+    const double rise =
+        PoseGraphOptimizer().Optimize(with).costs.chi2log - (EvaluateCosts(graph).chi2log - chi2);
+    EXPECT_NEAR(predicted.chi2, rise, 0.02 * rise) << ToString(kind);
+    EXPECT_LT(predicted.chi2, chi2);
+    EXPECT_EQ(prediction->Of(last).chi2, predicted.chi2) << "what one call leaves behind spoils the next";
+  }
 }
 
 TEST(EdgePrediction, SpreadIsThatOfTheDenseCovariance) {
   const PoseGraph graph = WithNewcomer(GraphKind::kSE2);
-  const internal::GraphStructure structure = internal::AnalyseGraph(graph);
-  const PoseGraphOptions options;
   const std::size_t last = graph.edges().size() - 1;
-  const GraphProblem<3> problem = ProblemAt<3>(graph, structure, options);
-  EdgePrediction<3> prediction(problem);
-  ASSERT_TRUE(prediction.Update());
-  int size = 0;
-  const std::vector<int> row = internal::NumberRows<3>(structure.constant, size);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size), J;
+  const testing::ProblemAtPoses made(graph);
+  made.problem->SetWeight(last, 0);
+  const auto prediction = internal::MakeEdgePrediction(*made.problem);
+  ASSERT_TRUE(prediction->Update());
+  int unknowns = 0;
+  const std::vector<int> unknown = internal::NumberUnknowns(made.structure.constant, unknowns);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3 * unknowns, 3 * unknowns), J;
   for (std::size_t e = 0; e <= last; ++e) {
-    const internal::LinearizedEdge<3> edge = problem.Linearized(e);
-    J = Eigen::MatrixXd::Zero(3, size);
-    const std::size_t ends[2] = {structure.ends[e].from, structure.ends[e].to};
+    const auto edge = static_cast<const internal::WeightedGraph<3>&>(*made.problem).Linearized(e);
+    J = Eigen::MatrixXd::Zero(3, 3 * unknowns);
+    const std::size_t ends[2] = {made.structure.ends[e].from, made.structure.ends[e].to};
     for (int a = 0; a < 2; ++a) {
-      if (row[ends[a]] >= 0) J.middleCols(row[ends[a]], 3) = edge.jacobian[a];
+      if (unknown[ends[a]] >= 0) J.middleCols(3 * unknown[ends[a]], 3) = edge.jacobian[a];
     }
     if (e < last) H += J.transpose() * J;
   }
   const Eigen::Matrix3d S = Eigen::Matrix3d::Identity() + J * testing::DenseInverse(H) * J.transpose();
-  EXPECT_NEAR(prediction.Of(last).spread, std::log(S.determinant()), 1e-6);
+  EXPECT_NEAR(prediction->Of(last).spread, std::log(S.determinant()), 1e-6);
 }
 
 TEST(EdgePrediction, HasNoAnswerWhereTheGraphFallsApart) {
@@ -88,10 +68,9 @@ TEST(EdgePrediction, HasNoAnswerWhereTheGraphFallsApart) {
   const Similarity step(1, Eigen::Quaterniond::Identity(), {1, 0, 0});
   graph.AddOdometry(0, 1, step, Matrix7d::Identity());
   graph.AddLoop(1, 2, step, Matrix7d::Identity());
-  const internal::GraphStructure structure = internal::AnalyseGraph(graph);
-  const PoseGraphOptions options;
-  const GraphProblem<6> problem = ProblemAt<6>(graph, structure, options);
-  EXPECT_FALSE(EdgePrediction<6>(problem).Update());
+  const testing::ProblemAtPoses made(graph);
+  made.problem->SetWeight(1, 0);
+  EXPECT_FALSE(internal::MakeEdgePrediction(*made.problem)->Update());
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/dense_solvers.h"
-#include "core/householder.h"
+#include "core/eigen_bits.h"
 
 namespace tutti::internal {
 // As Eigen::SelfAdjointEigenSolver does it.

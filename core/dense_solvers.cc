@@ -5,7 +5,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 
-#include "core/small_ldlt.h"
+#include "core/eigen_bits.h"
 
 namespace tutti::internal {
 

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/number_lines.h"
-#include "core/text_input.h"
+#include "core/text_reader.h"
 #include "core/time_stamps.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"

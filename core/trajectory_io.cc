@@ -3,13 +3,11 @@
 #include <optional>
 #include <utility>
 
-#include "core/number_lines.h"
 #include "core/pose_columns.h"
 #include "core/pose_reader.h"
 #include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "core/time_stamps.h"
-#include "core/tum_line.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"

@@ -6,7 +6,7 @@
 #include "backend/graph/g2o_contents.h"
 #include "backend/graph/graph_structure.h"
 #include "core/dense_solvers.h"
-#include "core/text_input.h"
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

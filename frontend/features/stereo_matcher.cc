@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/eigen_bits.h"
 #include "core/median.h"
 #include "core/sanitized_range.h"
-#include "core/small_ldlt.h"
 #include "frontend/features/grey_window.h"
 
 namespace tutti {

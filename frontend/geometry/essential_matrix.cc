@@ -9,7 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/dense_solvers.h"
-#include "core/householder.h"
+#include "core/eigen_bits.h"
 
 namespace tutti::internal {
 namespace {

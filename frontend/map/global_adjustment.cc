@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "core/sections.h"
+#include "core/section_file.h"
 #include "core/state_archive.h"
 
 namespace tutti {

@@ -10,7 +10,6 @@
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/overlap_truth.h"
 #include "core/median.h"
-#include "core/number_lines.h"
 #include "core/pose_columns.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"

@@ -1,4 +1,5 @@
-// Connected parts of a graph and what holds each in place. Private to the back end.
+// Connected parts of a graph, what holds each in place, and which nodes follow each other. Private to the
+// back end.
 #pragma once
 
 #include <cstddef>
@@ -31,6 +32,17 @@ GraphStructure HeldByPriors(GraphStructure structure, const PoseGraph& graph);
 
 /// Position of each node among those that move; -1: held in place.
 std::vector<int> NumberUnknowns(const std::vector<bool>& constant, int& count);
+
+/// Nodes by their ids, which are all that a file says about their order.
+struct NodeOrder {
+  std::vector<std::size_t> place;  ///< of each node, parallel to nodes(): 0 for the smallest id
+  std::vector<std::size_t> robot;  ///< the same: nodes of one robot have one number
+};
+
+NodeOrder OrderOf(const PoseGraph& graph);
+
+/// The representative of k in a forest of parents (union-find); shortens the way to it.
+std::size_t RootOf(std::vector<std::size_t>& parent, std::size_t k);
 
 /// Calls f(n) with the number of a node's coordinates as a constant: `n` converts to 3, 6 or 7 in a
 /// template's argument.

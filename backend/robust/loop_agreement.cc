@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "backend/graph/odometry_edges.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/uncertainty/edge_covariance.h"
 
@@ -12,11 +11,6 @@ namespace {
 
 /// Both ends of two loops of a cluster are within so many nodes of each other.
 constexpr std::size_t kClusterReach = 10;
-
-std::size_t RootOf(std::vector<std::size_t>& parent, std::size_t k) {
-  while (parent[k] != k) k = parent[k] = parent[parent[k]];
-  return k;
-}
 
 }  // namespace
 

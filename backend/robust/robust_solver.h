@@ -10,15 +10,6 @@
 
 namespace tutti::internal {
 
-/// Chi-square of each of these edges, all of weight 1, against the solution without it (the externally
-/// studentised residual of regression diagnostics; Cook and Weisberg, 1982); `problem` is at an optimum of
-/// its weights, each 0 or 1. With r the whitened error in the solution, H the graph's information matrix and
-/// P = J H^-1 J^T it is r^T (I - P)^-1 r: to first order what the graph's cost falls by when the edge leaves.
-/// A loop that has bent the graph to its liking has a small error and a large value here. Directions in which
-/// nothing but the edge itself holds its ends (eigenvalue 1 of P) say nothing about it and do not count.
-/// Empty if the edges of weight 1 do not hold the graph together.
-std::vector<double> LeaveOneOutChi2(const GraphProblem& problem, const std::vector<std::size_t>& edges);
-
 /// The noise that these chi-squares show, three sigma wide on top of the 99 % quantile, as a share of that
 /// quantile: min(1, 9 median / median of the distribution). No noise makes it wider than the quantile itself.
 double ShownShare(const std::vector<double>& chi2, int dimension);

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "backend/graph/manifold.h"
-#include "backend/solver/block_pattern.h"
 #include "backend/solver/block_system.h"
 #include "backend/solver/weighted_graph.h"
 #include "core/least_squares.h"

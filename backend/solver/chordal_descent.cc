@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 
-#include "backend/solver/block_pattern.h"
 #include "backend/solver/block_system.h"
 #include "core/least_squares.h"
 #include "core/stopwatch.h"

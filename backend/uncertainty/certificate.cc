@@ -9,7 +9,6 @@
 
 #include "backend/graph/graph_structure.h"
 #include "backend/solver/block_cholesky.h"
-#include "backend/solver/block_pattern.h"
 #include "backend/solver/chordal_descent.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"

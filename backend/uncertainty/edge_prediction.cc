@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "backend/solver/weighted_graph.h"
+#include "backend/uncertainty/selected_inverse.h"
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 
@@ -85,11 +87,69 @@ class EdgePredictionOf final : public EdgePrediction {
   std::vector<bool> reached_;      // false between calls
 };
 
+template <int N>
+class LeaveOneOut {
+ public:
+  explicit LeaveOneOut(const WeightedGraph<N>& problem)
+      : problem_(problem),
+        unknown_(NumberUnknowns(problem.structure().constant, unknowns_)),
+        inverse_(problem.InformationMatrix(unknown_)) {}
+
+  bool Ok() const { return inverse_.Ok(); }
+
+  double Chi2(std::size_t e) const {
+    const LinearizedEdge<N> edge = problem_.Linearized(e);
+    const auto [from, to] = problem_.structure().ends[e];
+    const int at[2] = {unknown_[from], unknown_[to]};
+    Square P = Square::Zero();
+    for (int a = 0; a < 2; ++a) {
+      for (int b = 0; b < 2; ++b) {
+        if (at[a] >= 0 && at[b] >= 0)
+          P += edge.jacobian[a] * Covariance(N * at[a], N * at[b]) * edge.jacobian[b].transpose();
+      }
+    }
+    const Eigenpairs eigen = SymmetricEigen(P);
+    const Eigen::Matrix<double, N, 1> error = eigen.vectors.transpose() * edge.error;
+    double sum = 0;
+    for (int k = 0; k < N; ++k) {
+      const double rest = 1 - eigen.values(k);
+      if (rest > kLeastHold) sum += error(k) * error(k) / rest;
+    }
+    return sum;
+  }
+
+ private:
+  using Square = Eigen::Matrix<double, N, N>;
+  static constexpr double kLeastHold = 1e-6;  // below it rounding decides
+
+  Square Covariance(int r, int c) const {
+    Square out;
+    for (int i = 0; i < N; ++i) {
+      for (int k = 0; k < N; ++k) out(i, k) = inverse_.At(r + i, c + k);
+    }
+    return out;
+  }
+
+  const WeightedGraph<N>& problem_;
+  int unknowns_ = 0;
+  std::vector<int> unknown_;
+  SelectedInverse inverse_;
+};
+
 }  // namespace
 
 std::unique_ptr<EdgePrediction> MakeEdgePrediction(const GraphProblem& problem) {
   return WithDimension(problem, [](const auto& as) -> std::unique_ptr<EdgePrediction> {
     return std::make_unique<EdgePredictionOf<std::decay_t<decltype(as)>::kDimension>>(as);
+  });
+}
+
+std::vector<double> LeaveOneOutChi2(const GraphProblem& problem, const std::vector<std::size_t>& edges) {
+  return WithDimension(problem, [&](const auto& as) {
+    const LeaveOneOut<std::decay_t<decltype(as)>::kDimension> without(as);
+    std::vector<double> out;
+    for (std::size_t k = 0; without.Ok() && k < edges.size(); ++k) out.push_back(without.Chi2(edges[k]));
+    return out;
   });
 }
 

@@ -1,23 +1,14 @@
 #include "tutti/core/span_recorder.h"
 
+#include <array>
 #include <ctime>
 
 namespace tutti {
 
 const char* ToString(Lane lane) {
-  switch (lane) {
-    case Lane::kReading:
-      return "reading";
-    case Lane::kTracking:
-      return "tracking";
-    case Lane::kMapping:
-      return "mapping";
-    case Lane::kLoopClosure:
-      return "loop closure";
-    case Lane::kOptimisation:
-      return "optimisation";
-  }
-  return "?";
+  static constexpr std::array<const char*, kLanes> kNames = {"reading", "tracking", "mapping", "loop closure",
+                                                             "optimisation"};
+  return kNames.at(static_cast<std::size_t>(lane));
 }
 
 void SpanRecorder::Add(Span span) {

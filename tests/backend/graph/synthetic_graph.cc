@@ -1,6 +1,7 @@
 #include "tests/backend/graph/synthetic_graph.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace tutti::testing {
@@ -124,6 +125,21 @@ std::vector<Similarity> PosesOf(const PoseGraph& graph) {
   std::vector<Similarity> poses;
   for (const PoseGraphNode& node : graph.nodes()) poses.push_back(node.pose);
   return poses;
+}
+
+PoseGraph WithoutPoses(const PoseGraph& graph) {
+  PoseGraph out(graph.kind());
+  for (PoseGraphNode node : graph.nodes()) {
+    node.has_estimate = false;
+    out.AddNode(node);
+  }
+  for (const PoseGraphEdge& edge : graph.edges()) out.AddEdge(edge);
+  return out;
+}
+
+std::string TestName(std::string name) {
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
 }
 
 ProblemAtPoses::ProblemAtPoses(PoseGraph of, const PoseGraphOptions& with)

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "backend/solver/graph_problem.h"
@@ -42,6 +43,12 @@ double PositionError(const PoseGraph& graph, const std::vector<Similarity>& trut
 
 /// S_world_node in the order of the nodes.
 std::vector<Similarity> PosesOf(const PoseGraph& graph);
+
+/// The graph without estimates of its nodes.
+PoseGraph WithoutPoses(const PoseGraph& graph);
+
+/// "parking-garage" as the name of a test.
+std::string TestName(std::string name);
 
 /// A graph as the problem that solvers see, at its poses.
 struct ProblemAtPoses {

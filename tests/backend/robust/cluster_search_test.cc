@@ -103,13 +103,7 @@ Planted PlantedIn(const std::filesystem::path& file, int count, int cluster_size
   loops.cluster_size = cluster_size;
   loops.seed = seed;
   const std::size_t first = PlantFalseLoops(clean, loops).front();
-  PoseGraph start(clean.kind());
-  for (PoseGraphNode node : clean.nodes()) {
-    node.has_estimate = false;
-    start.AddNode(node);
-  }
-  for (const PoseGraphEdge& edge : clean.edges()) start.AddEdge(edge);
-  return {start, first};
+  return {testing::WithoutPoses(clean), first};
 }
 
 PoseGraphReport Solve(PoseGraph& graph) {

@@ -161,11 +161,7 @@ TEST_P(BothSolvers, ReachTheSameOptimumOfAPublishedGraph) {
 INSTANTIATE_TEST_SUITE_P(Published, BothSolvers,
                          ::testing::Values("sphere2500", "parking-garage", "intel", "manhattanOlson3500",
                                            "kitti_00", "manhattan", "torus3D"),
-                         [](const auto& test) {
-                           std::string name;
-                           for (char c : std::string(test.param)) name += c == '-' ? '_' : c;
-                           return name;
-                         });
+                         [](const auto& test) { return testing::TestName(test.param); });
 
 }  // namespace
 }  // namespace tutti

@@ -191,19 +191,6 @@ TEST(Measurements, OfWhatIsMissingOrMixedUpNameTheLine) {
   EXPECT_THAT(error("VERTEX_TRACKXYZ 9 0 0 0\n"), HasSubstr(":2: VERTEX_TRACKXYZ in a graph of SE(2)"));
 }
 
-/// One of each tag in 3D, with a sensor that is not at its node's origin.
-PoseGraph EverythingIn3D() {
-  return Read(
-             "PARAMS_SE3OFFSET 0 0.3 -0.2 0.1 0.1 0.2 0.3 0.9\n"
-             "VERTEX_SE3:QUAT 0 0 0 0 0.1 0 0 1\nVERTEX_SE3:QUAT 1 1 0.2 0 0 0.2 0.1 1\n"
-             "VERTEX_TRACKXYZ 5 2 1 3\nVERTEX_TRACKXYZ 6 2 1 4\nFIX 0\n"
-             "EDGE_SE3_TRACKXYZ 1 5 0 1 2 3 4 1 0 5 1 6\nEDGE_POINTXYZ 5 6 0.1 0 1.2 1 0 0 1 0 1\n"
-             "EDGE_SE3_PRIOR 1 0 1 0.5 0 0 0.1 0 1 3 0 0 0 0 1 3 0 0 0 0 3 0 0 0 9 0 0 9 0 9\n"
-             "EDGE_SE3_XYZPRIOR 1 0 1 1 1 2 0 0 2 0 2\nEDGE_SE3_PRIORXY 1 3 4 1 0 1\n"
-             "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n")
-      .graph;
-}
-
 /// Largest difference between the analytic gradient of half the cost and its central difference.
 template <int N>
 double GradientError(const PoseGraph& graph, GraphObjective objective) {
@@ -270,7 +257,17 @@ TEST(Measurements, HaveTheGradientsOfTheirCosts) {
           "EDGE_PRIOR_XY 5 3 3 1 0 1\n")
           .graph;
   EXPECT_LT(GradientError<3>(planar, GraphObjective::kChi2), 1e-6);
-  const PoseGraph rigid = EverythingIn3D();
+  // One of each tag, with a sensor that is not at the origin of its node.
+  const PoseGraph rigid =
+      Read(
+          "PARAMS_SE3OFFSET 0 0.3 -0.2 0.1 0.1 0.2 0.3 0.9\n"
+          "VERTEX_SE3:QUAT 0 0 0 0 0.1 0 0 1\nVERTEX_SE3:QUAT 1 1 0.2 0 0 0.2 0.1 1\n"
+          "VERTEX_TRACKXYZ 5 2 1 3\nVERTEX_TRACKXYZ 6 2 1 4\nFIX 0\n"
+          "EDGE_SE3_TRACKXYZ 1 5 0 1 2 3 4 1 0 5 1 6\nEDGE_POINTXYZ 5 6 0.1 0 1.2 1 0 0 1 0 1\n"
+          "EDGE_SE3_PRIOR 1 0 1 0.5 0 0 0.1 0 1 3 0 0 0 0 1 3 0 0 0 0 3 0 0 0 9 0 0 9 0 9\n"
+          "EDGE_SE3_XYZPRIOR 1 0 1 1 1 2 0 0 2 0 2\nEDGE_SE3_PRIORXY 1 3 4 1 0 1\n"
+          "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n")
+          .graph;
   ASSERT_EQ(rigid.measurements().size(), 5u);
   EXPECT_LT(GradientError<6>(rigid, GraphObjective::kChi2), 1e-6);
   EXPECT_LT(GradientError<6>(rigid, GraphObjective::kChi2Log), 1e-6);

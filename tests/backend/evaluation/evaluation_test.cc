@@ -52,13 +52,6 @@ TEST(Evaluation, RigidAlignmentLeavesTheScaleAlone) {
   EXPECT_GT(report.ate.rmse, 0.5);
 }
 
-TEST(Evaluation, AlignmentHasNoReflection) {
-  const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
-  std::vector<Eigen::Vector3d> mirrored = points;
-  for (Eigen::Vector3d& p : mirrored) p.x() = -p.x();
-  EXPECT_NEAR(AlignPoints(points, mirrored, false).rotation.toRotationMatrix().determinant(), 1.0, 1e-12);
-}
-
 TEST(Evaluation, OriginAlignmentPutsTheFirstPosesTogether) {
   const Trajectory reference = Curve(50);
   EvaluationOptions options;

@@ -9,6 +9,7 @@
 
 #include "core/text_reader.h"
 #include "tests/backend/graph/synthetic_graph.h"
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -20,12 +21,7 @@ using ::testing::HasSubstr;
 std::filesystem::path GraphFile(const std::string& text) { return testing::FreshFile("graph.g2o", text); }
 
 std::string ErrorOfText(const std::string& text, BadInformation bad = BadInformation::kRefuse) {
-  try {
-    ReadG2o(GraphFile(text), bad);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::ErrorOf([&] { ReadG2o(GraphFile(text), bad); });
 }
 
 constexpr const char* kVertices = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.1\n";

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tutti/core/error.h"
+#include "tests/support/error_of.h"
 
 namespace tutti {
 namespace {
@@ -19,12 +19,7 @@ PoseGraph TwoNodes() {
 }
 
 std::string ErrorOfEdge(PoseGraph& graph, const PoseGraphEdge& edge) {
-  try {
-    graph.AddEdge(edge);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return testing::ErrorOf([&] { graph.AddEdge(edge); });
 }
 
 /// A chain over these ids in which each node has an edge to the next one; which of them are odometry?

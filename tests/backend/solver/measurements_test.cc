@@ -10,11 +10,11 @@
 #include "backend/solver/measurement_terms.h"
 #include "core/text_reader.h"
 #include "tests/backend/graph/synthetic_graph.h"
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -174,12 +174,7 @@ TEST(Measurements, AFixedLandmarkHoldsTheGraph) {
 
 TEST(Measurements, OfWhatIsMissingOrMixedUpNameTheLine) {
   const auto error = [](const std::string& text) {
-    try {
-      Read("EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n" + text);
-    } catch (const InputError& e) {
-      return std::string(e.what());
-    }
-    return std::string("no error");
+    return testing::ErrorOf([&] { Read("EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n" + text); });
   };
   EXPECT_THAT(error("EDGE_SE2_XY 0 1 1 1 1 0 1\n"), HasSubstr(":2: 1 is a pose in one line and a landmark"));
   EXPECT_THAT(error("VERTEX_XY 7 0 0\nEDGE_SE2 1 7 1 0 0 1 0 0 1 0 1\n"),

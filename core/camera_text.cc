@@ -47,7 +47,7 @@ Lens LensOf(const std::string& model) {
   return Lens::kUnknown;
 }
 
-// Of values that are not 0 from `first` on, the first one; else their number.
+// Position of the first value from `first` on that is not 0; else their number.
 std::size_t FirstUsed(const std::vector<double>& values, std::size_t first) {
   while (first < values.size() && values[first] == 0) ++first;
   return first;

@@ -18,7 +18,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 namespace tutti::internal {
 namespace orb_smoothing {  // what only OrbDescription needs
@@ -130,8 +130,8 @@ class OrbDescription {
   static constexpr int kBytes = 32;   ///< of a descriptor
   static constexpr int kMargin = 19;  ///< how far from the image's rim a corner has to be [px]
 
-  /// Of an 8-bit grey image, which may be gone afterwards. `rim`: what was put around it, 0 or at least 3
-  /// [px]; it is not smoothed itself, as in cv::ORB.
+  /// Smooths an 8-bit grey image, which may be gone afterwards. `rim`: what was put around it, 0 or at least
+  /// 3 [px]; it is not smoothed itself, as in cv::ORB.
   explicit OrbDescription(const cv::Mat& image, int rim = 0) {
     if (rim > 0) {
       smooth_ = image.clone();

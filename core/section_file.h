@@ -59,7 +59,7 @@ struct SectionHeader {
   std::uint64_t like = 0;      ///< 0, or where the section begins that zstd had seen before this one
 };
 
-/// Of all of the header but the checksum, and of what follows it in the file.
+/// Checksum of all of the header but the checksum, and of what follows it in the file.
 std::uint32_t SectionChecksum(const SectionHeader& header, std::string_view stored);
 
 /// A content is at most so many times as long as what is stored of it: what a file needs of memory is known

@@ -8,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

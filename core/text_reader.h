@@ -33,7 +33,7 @@ class TextReader {
   /// The next line without its line feed; false after the last one. The three bytes with which editors of
   /// Windows begin a text in UTF-8 are left out.
   bool Next(std::string& line);
-  /// Of the line that Next gave last, counted from 1.
+  /// Number of the line that Next gave last, counted from 1.
   std::size_t number() const { return number_; }
 
  private:

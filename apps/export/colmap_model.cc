@@ -6,7 +6,7 @@
 
 #include "apps/export/image_name.h"
 #include "apps/export/little_endian.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/replaced_file.h"
 
 namespace tutti {

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <limits>
 
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

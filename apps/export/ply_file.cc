@@ -3,7 +3,7 @@
 #include <string>
 
 #include "apps/export/little_endian.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/replaced_file.h"
 
 namespace tutti {

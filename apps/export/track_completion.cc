@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

@@ -12,7 +12,7 @@
 #include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/slam/version.h"
 
 namespace tutti {

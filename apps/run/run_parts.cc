@@ -8,7 +8,7 @@
 #include <set>
 
 #include "apps/run/run_note.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

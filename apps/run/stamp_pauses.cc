@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

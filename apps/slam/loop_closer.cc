@@ -6,7 +6,7 @@
 
 #include "apps/slam/joining_loops.h"
 #include "apps/slam/loop_reach.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "core/stopwatch.h"
 
 namespace tutti {

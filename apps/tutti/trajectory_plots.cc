@@ -7,7 +7,7 @@
 
 #include "apps/plot/plot.h"
 #include "apps/plot/plot_panels.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 

@@ -5,8 +5,7 @@
 #include <iterator>
 #include <limits>
 
-#include "core/angle.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 

@@ -281,7 +281,7 @@ Eigen::Vector2d KeyframeGraph::Walked(int keyframe) const {
   return after == walked_.begin() ? Eigen::Vector2d::Zero() : std::prev(after)->second;
 }
 
-// The same of one keyframe to another, but for the steps to outliers and from them.
+// Variances from one keyframe to another, but for the steps to outliers and from them.
 Eigen::Vector2d KeyframeGraph::WalkedBetween(int older, int newer) const {
   Eigen::Vector2d walked = Walked(newer) - Walked(older);
   std::set<int> steps;  // keyframes that they lead to
@@ -303,8 +303,8 @@ bool KeyframeGraph::Unknown(const Edge& edge) const {
          outliers_.count(edge.newer) != 0;
 }
 
-// Of (translation, rotation, log scale). Over several steps errors of length add up as if they were all in
-// one direction: that makes up for what the turns between them do to the end.
+// Standard deviations of (translation, rotation, log scale). Over several steps errors of length add up as if
+// they were all in one direction: that makes up for what the turns between them do to the end.
 Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {
   const double steps = std::sqrt(edge.steps);
   const Eigen::Vector2d walked = WalkedBetween(edge.older, edge.newer).cwiseSqrt();
@@ -364,7 +364,7 @@ KeyframeCorrection KeyframeGraph::Optimize(const std::vector<LoopEdge>& loops) c
 }
 
 KeyframeGraphProof KeyframeGraph::Prove(const std::vector<LoopEdge>& loops) const {
-  // Of the objective, and in its unit: another valley, not another end of the same.
+  // A share of the objective, and in its unit: another valley, not another end of the same.
   constexpr double kLower = 1e-3, kLeast = 1e-3;
   KeyframeGraphProof out;
   std::optional<PoseGraph> best;

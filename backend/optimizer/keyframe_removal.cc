@@ -50,7 +50,7 @@ Matrix7d LessSure(const Matrix7d& information, const Matrix7d& covariance) {
 
 }  // namespace
 
-// As measured; two keyframes without an edge are where the map has them.
+// The edge is as measured; two keyframes without one are where the map has them.
 KeyframeGraph::Edge KeyframeGraph::Between(int older, int newer) const {
   const auto before = [](const Edge& edge, const Ends& ends) { return Ends(edge.older, edge.newer) < ends; };
   const auto at = std::lower_bound(edges_.begin(), edges_.end(), Ends(older, newer), before);
@@ -113,7 +113,7 @@ void KeyframeGraph::Remove(const std::map<int, int>& into) {
                    keyframes_.end());
 }
 
-// Of the tangent (translation, rotation, log scale): S Exp(d) = Exp(Adjoint(S) d) S.
+// Adjoint of the tangent (translation, rotation, log scale): S Exp(d) = Exp(Adjoint(S) d) S.
 Matrix7d KeyframeGraph::Adjoint(const Similarity& S) const {
   const Eigen::Matrix3d R = S.rotation.toRotationMatrix();
   Matrix7d adjoint = Matrix7d::Identity();

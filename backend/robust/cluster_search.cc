@@ -43,7 +43,7 @@ class ClusterGrowth {
   static constexpr double kFirstGate = 0.01, kGateStep = 3;  // shares of the threshold
   static constexpr int kIterations = 10;                     // of a solution between two rounds
 
-  /// Of the waiting clusters whose chi-square passes, the half that the graph is more certain of.
+  /// The half that the graph is more certain of, of the waiting clusters whose chi-square passes.
   std::vector<std::size_t> Certain(const std::vector<std::size_t>& waiting, double gate) {
     std::vector<std::tuple<double, double, std::size_t>> passing;  // spread, chi-square, cluster
     for (const std::size_t k : waiting) {
@@ -59,7 +59,7 @@ class ClusterGrowth {
     return out;
   }
 
-  /// Of its first, middle and last loop the median chi-square and the least spread.
+  /// The median chi-square and the least spread of its first, middle and last loop.
   PredictedEdge Predicted(const LoopCluster& cluster) {
     const PredictedEdge middle = prediction_->Of(cluster[cluster.size() / 2]);
     if (cluster.size() == 2) return middle;

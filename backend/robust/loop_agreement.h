@@ -27,7 +27,7 @@ struct MeasuredLoop {
   Pose measurement;              ///< T_from_to; the scale of Sim(3) is left out
   Matrix6d covariance;           ///< as a perturbation of the frame of `to` [m^2, m rad, rad^2]
 
-  /// The same loop as its other end sees it.
+  /// This loop as its other end sees it.
   MeasuredLoop Reversed() const;
 };
 

@@ -6,7 +6,7 @@
 
 #include "backend/solver/robust_loss.h"
 #include "backend/uncertainty/edge_prediction.h"
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 namespace {

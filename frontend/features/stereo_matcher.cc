@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "core/eigen_bits.h"
-#include "core/median.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
+#include "core/numbers.h"
 #include "frontend/features/grey_window.h"
 
 namespace tutti {

@@ -3,7 +3,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/map/other_camera.h"
 #include "frontend/odometry/frame_check.h"

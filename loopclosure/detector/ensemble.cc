@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/parallel.h"
 #include "loopclosure/features/gradient_descriptor.h"
 #include "tutti/core/error.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/detector/nearest_view.h"
 #include "loopclosure/filter/loop_probability.h"
 #include "loopclosure/filter/transition_model.h"

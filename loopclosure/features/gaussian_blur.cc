@@ -7,8 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/clones.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 namespace tutti::internal {
 namespace {

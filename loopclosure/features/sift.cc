@@ -7,8 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "core/clones.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 #include "loopclosure/features/gaussian_blur.h"
 #include "loopclosure/features/sift_descriptor.h"
 

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/clones.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 namespace tutti::internal {
 namespace {

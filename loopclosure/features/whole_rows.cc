@@ -4,8 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/clones.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #include <immintrin.h>

@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "core/byte_stream.h"
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

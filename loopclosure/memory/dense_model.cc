@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "core/byte_stream.h"
-#include "core/index.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/byte_stream.h"
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/shuffle.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/word_bytes.h"

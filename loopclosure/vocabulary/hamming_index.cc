@@ -2,7 +2,7 @@
 #include <random>
 
 #include "core/byte_stream.h"
-#include "core/clones.h"
+#include "core/inner_loops.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/bit_trie.h"
 #include "loopclosure/vocabulary/descriptor_index.h"

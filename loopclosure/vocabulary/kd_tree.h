@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/descriptor_index.h"

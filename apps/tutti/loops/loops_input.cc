@@ -9,7 +9,7 @@
 
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/overlap_truth.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/pose_columns.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"

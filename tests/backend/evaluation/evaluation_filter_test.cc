@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tests/support/error_of.h"
 #include "tutti/backend/evaluation.h"
 

@@ -32,6 +32,14 @@ std::vector<MapKeyframe> KeyframesOf(const testing::SyntheticGraph& synthetic) {
   return keyframes;
 }
 
+// A metre from each to the next.
+std::vector<MapKeyframe> StraightLine(int count) {
+  std::vector<MapKeyframe> keyframes;
+  for (int id = 0; id < count; ++id)
+    keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {1.0 * id, 0, 0})});
+  return keyframes;
+}
+
 KeyframeGraph FromOdometry(const testing::SyntheticGraph& synthetic, GraphKind kind) {
   KeyframeGraphOptions options;
   options.kind = kind;
@@ -217,12 +225,8 @@ TEST(KeyframeGraph, AnEdgeIsAsUncertainAsTheMotionsBetweenItsEnds) {
   options.sigma_translation_ratio = 0;
   options.sigma_rotation_rad = 1e-4;
   KeyframeGraph graph(options);
-  std::vector<MapKeyframe> keyframes;
-  for (int id = 0; id < 5; ++id) {
-    keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {1.0 * id, 0, 0})});
-    if (id < 4) graph.NoteMotion(id, {0.3 * id, 0.01 * id});
-  }
-  graph.Update(keyframes, {{0, 2, 100}});
+  for (int id = 0; id < 4; ++id) graph.NoteMotion(id, {0.3 * id, 0.01 * id});
+  graph.Update(StraightLine(5), {{0, 2, 100}});
   const PoseGraph known = graph.Graph({});
   for (const PoseGraphEdge& edge : known.edges()) {
     double translation2 = 0, rotation2 = 0;
@@ -438,10 +442,7 @@ TEST(KeyframeGraph, ARecordingThatBeginsIsTiedToWhatItSees) {
     std::sort(out.begin(), out.end());
     return out;
   };
-  std::vector<MapKeyframe> keyframes;
-  keyframes.reserve(40);
-  for (int id = 0; id < 40; ++id)
-    keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {double(id), 0, 0})});
+  const std::vector<MapKeyframe> keyframes = StraightLine(40);
   KeyframeGraph graph, before;
   graph.BeginSession(30);
   graph.Update(keyframes, {{4, 30, 80}});
@@ -526,11 +527,7 @@ TEST(LoopEdge, OfKeyframesThatKeepTheirScaleStays) {
 TEST(KeyframeGraphSigmas, OfTwiceTheNoiseLetALoopMoveTheMapMore) {
   const auto distance = [](double ratio, double rotation) {
     KeyframeGraph graph{KeyframeGraphOptions()};
-    std::vector<MapKeyframe> keyframes;
-    keyframes.reserve(30);
-    for (int id = 0; id < 30; ++id)
-      keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {1.0 * id, 0, 0})});
-    graph.Update(keyframes);
+    graph.Update(StraightLine(30));
     graph.SetSigmas(ratio, rotation);
     LoopEdge loop;
     loop.candidate = 0;

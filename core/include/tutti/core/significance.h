@@ -22,7 +22,7 @@ struct McNemarResult {
 /// are taken as 0.
 McNemarResult McNemarTest(int only_a, int only_b);
 
-/// The same from outcomes, one per image (true: found). Throws InputError if the lengths differ.
+/// McNemar's test from outcomes, one per image (true: found). Throws InputError if the lengths differ.
 McNemarResult McNemarTest(const std::vector<bool>& a, const std::vector<bool>& b);
 
 /// Pairs from which on a p-value is worth reporting: with fewer, one lucky run decides.

@@ -98,15 +98,15 @@ bool KeyframeGraph::OfOnePiece(int older, int newer) const {
   return piece == b->piece;
 }
 
-const KeyframeGraph::Edge* KeyframeGraph::Kept(int older, int newer) const {
+const KeyframeGraph::Edge* KeyframeGraph::FindEdge(const std::vector<Edge>& edges, int older, int newer) {
   const Edge wanted{older, newer, {}};
-  const auto at = std::lower_bound(kept_.begin(), kept_.end(), wanted, Before<Edge>);
-  return at != kept_.end() && at->older == older && at->newer == newer ? &*at : nullptr;
+  const auto at = std::lower_bound(edges.begin(), edges.end(), wanted, Before<Edge>);
+  return at != edges.end() && at->older == older && at->newer == newer ? &*at : nullptr;
 }
 
 // Kept from before a correction, or as the map is.
 Similarity KeyframeGraph::Measured(int older, int newer) const {
-  const Edge* kept = Kept(older, newer);
+  const Edge* kept = FindEdge(kept_, older, newer);
   return kept != nullptr ? kept->S_older_newer
                          : Similarity(At(older).T_world_keyframe.Inverse() * At(newer).T_world_keyframe);
 }
@@ -194,7 +194,7 @@ std::vector<CovisiblePair> KeyframeGraph::Strongest(const std::vector<CovisibleP
     // Keyframes that a loop brought together see common landmarks too; that is the loop's edge, not the
     // odometry's.
     const bool recent =
-        kept_.empty() || c.newer - c.older < kRecentKeyframes || Kept(c.older, c.newer) != nullptr;
+        kept_.empty() || c.newer - c.older < kRecentKeyframes || FindEdge(kept_, c.older, c.newer) != nullptr;
     if (recent && !Follows(c.older, c.newer) && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
   }
   std::sort(candidates.begin(), candidates.end(), [](const CovisiblePair& a, const CovisiblePair& b) {

@@ -199,7 +199,7 @@ class KeyframeGraph {
   bool Follows(int older, int newer) const;
   void TieBeginnings();
   std::vector<CovisiblePair> Strongest(const std::vector<CovisiblePair>& covisible) const;
-  const Edge* Kept(int older, int newer) const;
+  static const Edge* FindEdge(const std::vector<Edge>& edges, int older, int newer);  // ascending
   Similarity Measured(int older, int newer) const;
   std::map<int, int> Merges(const std::vector<LoopEdge>& loops) const;
   std::map<int, Similarity> JoinedPieces(const std::vector<LoopEdge>& loops) const;

@@ -34,7 +34,7 @@ class ByteWriter {
     for (; value >= 0x80; value >>= 7) bytes_.push_back(static_cast<char>(value | 0x80));
     bytes_.push_back(static_cast<char>(value));
   }
-  /// The same for one of either sign.
+  /// PutVarint for a number of either sign.
   void PutSignedVarint(std::int64_t value) {
     PutVarint(static_cast<std::uint64_t>(value) << 1 ^ static_cast<std::uint64_t>(value >> 63));
   }

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <map>
 #include <optional>
+#include <utility>
 
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -16,50 +16,20 @@ enum class Lens { kNone, kRadTan, kRadial, kZero, kEquidistant, kOther, kUnknown
 
 // kRadial: radtan if p1 and p2 are 0 (librealsense's has them behind the radial part); kZero: a pinhole if
 // all are 0; kOther: never a pinhole.
-const std::map<std::string, Lens> kLenses = {{"", Lens::kRadTan},
-                                             {"none", Lens::kNone},
-                                             {"rectified", Lens::kNone},
-                                             {"radtan", Lens::kRadTan},
-                                             {"radialtangential", Lens::kRadTan},
-                                             {"plumbbob", Lens::kRadTan},
-                                             {"pinhole", Lens::kRadTan},
-                                             {"perspective", Lens::kRadTan},
-                                             {"opencv", Lens::kRadTan},
-                                             {"brown", Lens::kRadTan},
-                                             {"brownconrady", Lens::kRadTan},
-                                             {"rational", Lens::kRadTan},
-                                             {"rationalpolynomial", Lens::kRadTan},
-                                             {"radtan8", Lens::kRadTan},
-                                             {"pinholeradtan", Lens::kRadTan},
-                                             {"pinholeradtan8", Lens::kRadTan},
-                                             {"pinholefull", Lens::kRadTan},
-                                             {"fullopencv", Lens::kRadTan},
-                                             {"modifiedbrownconrady", Lens::kRadial},
-                                             {"inversebrownconrady", Lens::kZero},
-                                             {"radialdivision", Lens::kZero},
-                                             {"division", Lens::kZero},
-                                             {"fov", Lens::kZero},
-                                             {"equidistant", Lens::kEquidistant},
-                                             {"equi", Lens::kEquidistant},
-                                             {"fisheye", Lens::kEquidistant},
-                                             {"opencvfisheye", Lens::kEquidistant},
-                                             {"kannalabrandt", Lens::kEquidistant},
-                                             {"kannalabrandt4", Lens::kEquidistant},
-                                             {"kannalabrandt8", Lens::kEquidistant},
-                                             {"kb4", Lens::kEquidistant},
-                                             {"kb8", Lens::kEquidistant},
-                                             {"omni", Lens::kOther},
-                                             {"mei", Lens::kOther},
-                                             {"ucm", Lens::kOther},
-                                             {"eucm", Lens::kOther},
-                                             {"ds", Lens::kOther},
-                                             {"doublesphere", Lens::kOther},
-                                             {"equirectangular", Lens::kOther},
-                                             {"scaramuzza", Lens::kOther},
-                                             {"ftheta", Lens::kOther},
-                                             {"thinprismfisheye", Lens::kOther},
-                                             {"fisheye624", Lens::kOther},
-                                             {"fisheye62", Lens::kOther}};
+const std::pair<Lens, std::vector<const char*>> kLenses[] = {
+    {Lens::kRadTan,
+     {"", "radtan", "radialtangential", "plumbbob", "pinhole", "perspective", "opencv", "brown",
+      "brownconrady", "rational", "rationalpolynomial", "radtan8", "pinholeradtan", "pinholeradtan8",
+      "pinholefull", "fullopencv"}},
+    {Lens::kNone, {"none", "rectified"}},
+    {Lens::kRadial, {"modifiedbrownconrady"}},
+    {Lens::kZero, {"inversebrownconrady", "radialdivision", "division", "fov"}},
+    {Lens::kEquidistant,
+     {"equidistant", "equi", "fisheye", "opencvfisheye", "kannalabrandt", "kannalabrandt4", "kannalabrandt8",
+      "kb4", "kb8"}},
+    {Lens::kOther,
+     {"omni", "mei", "ucm", "eucm", "ds", "doublesphere", "equirectangular", "scaramuzza", "ftheta",
+      "thinprismfisheye", "fisheye624", "fisheye62"}}};
 
 // "RS2_DISTORTION_BROWN_CONRADY", "distortion.brown_conrady" -> "brownconrady".
 Lens LensOf(const std::string& model) {
@@ -71,11 +41,13 @@ Lens LensOf(const std::string& model) {
   for (const std::string prefix : {"rs2", "distortion"}) {
     if (name.rfind(prefix, 0) == 0) name.erase(0, prefix.size());
   }
-  const auto known = kLenses.find(name);
-  return known == kLenses.end() ? Lens::kUnknown : known->second;
+  for (const auto& [lens, names] : kLenses) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) return lens;
+  }
+  return Lens::kUnknown;
 }
 
-// Of values that are not 0 from `first` on, the first one; else their number.
+// Position of the first value from `first` on that is not 0; else their number.
 std::size_t FirstUsed(const std::vector<double>& values, std::size_t first) {
   while (first < values.size() && values[first] == 0) ++first;
   return first;

@@ -1,10 +1,10 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/dense_solvers.h"
-#include "core/householder.h"
+#include "core/eigen_bits.h"
 
 namespace tutti::internal {
-// As Eigen::SelfAdjointEigenSolver does it.
+// The steps are those of Eigen::SelfAdjointEigenSolver.
 Eigenpairs SymmetricEigen(const SmallMatrixRef& a) {
   const Eigen::Index n = a.rows();
   if (n == 1) return {a.col(0), SmallMatrix::Ones(1, 1)};

@@ -5,7 +5,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 
-#include "core/small_ldlt.h"
+#include "core/eigen_bits.h"
 
 namespace tutti::internal {
 
@@ -22,7 +22,7 @@ SmallMatrix SolveLu(const SmallMatrixRef& a, const SmallMatrixRef& b) {
 
 void SolveLdlt(int n, const double* a, const double* b, double* x) {
   const Eigen::LDLT<SmallMatrix> factor(Eigen::Map<const Eigen::MatrixXd>(a, n, n));
-  // Of these the order of Eigen's sums depends on whether it knows their number.
+  // For these sizes the order of Eigen's sums depends on whether it knows them.
   if (n == 3 || n == 6 || n == 7) {
     std::copy_n(b, n, x);
     small_ldlt::SolveInPlace<7>(factor, x);

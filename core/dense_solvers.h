@@ -12,7 +12,7 @@
 namespace tutti::internal {
 
 constexpr int kMostRows = 13;
-/// Of at most kMostRows rows and columns, without memory from the heap.
+/// A matrix of at most kMostRows rows and columns takes no memory from the heap.
 using SmallMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostRows, kMostRows>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMostRows, 1>;
@@ -24,11 +24,11 @@ struct Eigenpairs {
   SmallMatrix vectors;
 };
 
-/// Of a symmetric matrix, values ascending; its lower triangle alone is read.
+/// Eigenpairs of a symmetric matrix, values ascending; its lower triangle alone is read.
 Eigenpairs SymmetricEigen(const SmallMatrixRef& a);
 
-/// Of any square matrix: those whose imaginary part is at most this, in Eigen's order. None where the
-/// iteration does not converge.
+/// Eigenpairs of any square matrix: those whose imaginary part is at most this, in Eigen's order. None where
+/// the iteration does not converge.
 Eigenpairs RealEigen(const SmallMatrixRef& a, double most_imaginary);
 
 /// U with U^T U = a, upper triangular. Of a matrix that is not positive definite: what was found until that
@@ -55,7 +55,7 @@ Eigen::Matrix<double, N, 1> SolveLdlt(const Eigen::Matrix<double, N, N>& a,
   SolveLdlt(N, a.data(), b.data(), x.data());
   return x;
 }
-/// The same for each column of `b`.
+/// SolveLdlt for each column of `b`.
 SmallMatrix SolveLdlt(const SmallMatrixRef& a, const SmallMatrixRef& b);
 
 /// The covariance that belongs to an information matrix; none if it is not positive definite or nearly

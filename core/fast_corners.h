@@ -50,7 +50,7 @@ inline bool MayBeCorner(const Rows& rows, int x, const Lanes& here, const Lanes&
   return cv::v_check_any(cv::v_max(bright - here, here - dark) > threshold);
 }
 
-// Of each arc of nine the least difference, and of these the greatest.
+// The least difference of each arc of nine, and the greatest of these.
 inline Lanes OfBestArc(const Circle& difference) {
   const auto at = [&difference](std::size_t k) -> const Lanes& { return difference[k % kRingPixels]; };
   std::array<Lanes, kRingPixels / 2> two, four;  // least of so many in a row, from each odd one on

@@ -32,7 +32,7 @@ class IntensityCentroid {
     }
   }
 
-  /// Of the corner at this pixel of an 8-bit grey image [deg], 0 to 360 by cv::fastAtan2.
+  /// Orientation of the corner at this pixel of an 8-bit grey image [deg], 0 to 360 by cv::fastAtan2.
   float Angle(const cv::Mat& image, int x, int y) const {
     constexpr int kLanes = cv::v_int16x8::nlanes;
     cv::v_int32x4 across = cv::v_setzero_s32();

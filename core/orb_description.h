@@ -13,13 +13,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 namespace tutti::internal {
 namespace orb_smoothing {  // what only OrbDescription needs
@@ -29,47 +28,21 @@ constexpr int kTaps = 2 * kRadius + 1;
 using Kernel = std::array<float, kTaps>;       // by value: nothing else may be where it is
 using Rows = std::array<const float*, kTaps>;  // the middle one and its neighbours
 
-// a b + c as the processor fuses it.
-struct Fused {
-  TUTTI_CHECKED_AS_A_WHOLE float operator()(float a, float b, float c) const {
-    return __builtin_fmaf(a, b, c);
-  }
-};
-
-// The same of numbers >= 0 where no processor does: the product is exact in double, and the sum is rounded to
-// odd, so that rounding once more to float rounds as if it were the only time. S. Boldo, G. Melquiond,
-// "Emulation of a FMA and correctly rounded sums: proved algorithms using rounding to odd", 2008.
-struct EmulatedFused {
-  TUTTI_CHECKED_AS_A_WHOLE float operator()(float a, float b, float c) const {
-    const double product = static_cast<double>(a) * static_cast<double>(b), add = static_cast<double>(c);
-    double sum = product + add;
-    const double part = sum - product;
-    const double error = (product - (sum - part)) + (add - part);
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &sum, sizeof bits);
-    if (error != 0 && (bits & 1) == 0) bits += error > 0 ? 1 : std::uint64_t{0} - 1;
-    std::memcpy(&sum, &bits, sizeof bits);
-    return static_cast<float>(sum);
-  }
-};
-
 // `from` points at the pixel kRadius to the left of the first one.
-template <class Fuse>
 TUTTI_CHECKED_AS_A_WHOLE inline void SmoothRow(const std::uint8_t* __restrict from, Kernel kernel, int count,
-                                               float* __restrict to, const Fuse& fuse) {
+                                               float* __restrict to) {
   CheckReadable(from, static_cast<std::size_t>(count) + 2 * kRadius);
   CheckWritable(to, static_cast<std::size_t>(count));
   const float* weights = kernel.data();
   for (int x = 0; x < count; ++x) {
     float sum = weights[0] * static_cast<float>(from[x]);
-    for (int k = 1; k < kTaps; ++k) sum = fuse(weights[k], static_cast<float>(from[x + k]), sum);
+    for (int k = 1; k < kTaps; ++k) sum = __builtin_fmaf(weights[k], static_cast<float>(from[x + k]), sum);
     to[x] = sum;
   }
 }
 
-template <class Fuse>
 TUTTI_CHECKED_AS_A_WHOLE inline void SmoothColumn(const Rows& rows, Kernel kernel, int count,
-                                                  std::uint8_t* __restrict to, const Fuse& fuse) {
+                                                  std::uint8_t* __restrict to) {
   for (const float* row : rows) CheckReadable(row, static_cast<std::size_t>(count));
   CheckWritable(to, static_cast<std::size_t>(count));
   constexpr float kToEven = 8388608.0F;  // 2^23: floats from here on are whole, halves went to even
@@ -77,9 +50,9 @@ TUTTI_CHECKED_AS_A_WHOLE inline void SmoothColumn(const Rows& rows, Kernel kerne
               *g = rows[6], *weights = kernel.data();
   for (int x = 0; x < count; ++x) {
     float sum = weights[3] * d[x];
-    sum = fuse(e[x] + c[x], weights[4], sum);
-    sum = fuse(f[x] + b[x], weights[5], sum);
-    sum = fuse(g[x] + a[x], weights[6], sum);
+    sum = __builtin_fmaf(e[x] + c[x], weights[4], sum);
+    sum = __builtin_fmaf(f[x] + b[x], weights[5], sum);
+    sum = __builtin_fmaf(g[x] + a[x], weights[6], sum);
     const int grey = static_cast<int>((sum + kToEven) - kToEven);
     to[x] = static_cast<std::uint8_t>(grey < 255 ? grey : 255);
   }
@@ -90,34 +63,25 @@ struct Smoothing {
   void (*column)(const Rows&, Kernel, int, std::uint8_t*);
 };
 
-TUTTI_CHECKED_AS_A_WHOLE inline void EmulatedRow(const std::uint8_t* from, Kernel kernel, int count,
-                                                 float* to) {
-  SmoothRow(from, kernel, count, to, EmulatedFused());
-}
-TUTTI_CHECKED_AS_A_WHOLE inline void EmulatedColumn(const Rows& rows, Kernel kernel, int count,
-                                                    std::uint8_t* to) {
-  SmoothColumn(rows, kernel, count, to, EmulatedFused());
-}
 #if defined(__x86_64__)
 #define TUTTI_FUSES __attribute__((target("avx2,fma"), flatten)) TUTTI_CHECKED_AS_A_WHOLE
-#else
-#define TUTTI_FUSES TUTTI_CHECKED_AS_A_WHOLE
-#endif
 TUTTI_FUSES inline void FusedRow(const std::uint8_t* from, Kernel kernel, int count, float* to) {
-  SmoothRow(from, kernel, count, to, Fused());
+  SmoothRow(from, kernel, count, to);
 }
 TUTTI_FUSES inline void FusedColumn(const Rows& rows, Kernel kernel, int count, std::uint8_t* to) {
-  SmoothColumn(rows, kernel, count, to, Fused());
+  SmoothColumn(rows, kernel, count, to);
 }
 #undef TUTTI_FUSES
+#endif
 
-// By what OpenCV may use, so that OPENCV_CPU_DISABLE and cv::setUseOptimized(false) choose the other one.
+// By what OpenCV may use, so that OPENCV_CPU_DISABLE and cv::setUseOptimized(false) choose the one in which
+// the C library fuses: the same bits, slowly.
 inline Smoothing Chosen() {
 #if defined(__x86_64__)
-  if (!cv::checkHardwareSupport(CV_CPU_AVX2) || !cv::checkHardwareSupport(CV_CPU_FMA3))
-    return {EmulatedRow, EmulatedColumn};
+  if (cv::checkHardwareSupport(CV_CPU_AVX2) && cv::checkHardwareSupport(CV_CPU_FMA3))
+    return {FusedRow, FusedColumn};
 #endif
-  return {FusedRow, FusedColumn};
+  return {SmoothRow, SmoothColumn};
 }
 
 // By a Gaussian of 2 px over 7 px, without what lies `rim` or less from the border: `to` has that size. With
@@ -166,8 +130,8 @@ class OrbDescription {
   static constexpr int kBytes = 32;   ///< of a descriptor
   static constexpr int kMargin = 19;  ///< how far from the image's rim a corner has to be [px]
 
-  /// Of an 8-bit grey image, which may be gone afterwards. `rim`: what was put around it, 0 or at least 3
-  /// [px]; it is not smoothed itself, as in cv::ORB.
+  /// Smooths an 8-bit grey image, which may be gone afterwards. `rim`: what was put around it, 0 or at least
+  /// 3 [px]; it is not smoothed itself, as in cv::ORB.
   explicit OrbDescription(const cv::Mat& image, int rim = 0) {
     if (rim > 0) {
       smooth_ = image.clone();

@@ -1,11 +1,16 @@
+// Work on several threads, and where its time goes.
 #include "core/parallel.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <ctime>
 #include <exception>
 #include <system_error>
 #include <thread>
 #include <vector>
+
+#include "tutti/core/span_recorder.h"
 
 namespace tutti {
 
@@ -35,6 +40,28 @@ void RunParallel(int count, int threads, const std::function<void(int)>& task) {
   for (const std::exception_ptr& error : errors) {
     if (error) std::rethrow_exception(error);
   }
+}
+
+const char* ToString(Lane lane) {
+  static constexpr std::array<const char*, kLanes> kNames = {"reading", "tracking", "mapping", "loop closure",
+                                                             "optimisation"};
+  return kNames.at(static_cast<std::size_t>(lane));
+}
+
+void SpanRecorder::Add(Span span) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  spans_.push_back(std::move(span));
+}
+
+std::vector<Span> SpanRecorder::Spans() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return spans_;
+}
+
+double ThreadCpuMilliseconds() {
+  timespec now = {};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace tutti

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdio>
 
-#include "core/text_input.h"
+#include "core/text_reader.h"
+#include "core/time_stamps.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -201,6 +203,15 @@ PoseColumns ColumnsOfNumbers(const Words& first, const Words& second, Trajectory
                              bool with_sigmas) {
   if (format == TrajectoryFormat::kKitti) return Kitti(first);
   return format == TrajectoryFormat::kEuroc ? Euroc(first) : Tum(first, second, with_sigmas);
+}
+
+std::string TumLine(const StampedPose& pose, std::optional<std::int64_t> stamp_ns) {
+  const Eigen::Vector3d& t = pose.pose.translation;
+  const Eigen::Quaterniond& q = pose.pose.rotation;
+  char line[1024];
+  std::snprintf(line, sizeof line, " %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", t.x(), t.y(), t.z(), q.x(), q.y(),
+                q.z(), q.w());
+  return (stamp_ns ? StampText(*stamp_ns) : StampText(pose.stamp_s)) + line;
 }
 
 TrajectoryFormat FormatOfNumbers(const std::string& line) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +43,11 @@ PoseColumns ColumnsOfNumbers(const std::vector<std::string>& first, const std::v
 
 /// The format that a line of numbers without names looks like.
 TrajectoryFormat FormatOfNumbers(const std::string& line);
+
+/// What WriteTrajectory puts first in TUM's format, and its lines, for those that write one pose at a time.
+constexpr const char* kTumHeader = "# timestamp tx ty tz qx qy qz qw\n";
+/// `stamp_ns`: in place of the stamp.
+std::string TumLine(const StampedPose& pose, std::optional<std::int64_t> stamp_ns = std::nullopt);
 
 }  // namespace tutti::internal
 #pragma GCC visibility pop

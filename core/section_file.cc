@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "core/byte_stream.h"
-#include "core/section_packer.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

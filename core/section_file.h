@@ -14,7 +14,26 @@
 #include "core/replaced_file.h"
 
 #pragma GCC visibility push(default)  // used across libraries
-namespace tutti::internal {
+struct ZSTD_CCtx_s;
+struct ZSTD_DCtx_s;
+
+namespace tutti {
+
+/// Tags; those of other modules have other hundreds.
+enum class Section : std::uint32_t {
+  kHead = 100,        ///< what it was made with, and how much follows
+  kKeyframe,          ///< one each
+  kLandmarks,         ///< so many together
+  kTracking,          ///< all that is no map
+  kTimes,             ///< milliseconds by stage, the only thing that varies from run to run
+  kGlobalAdjustment,  ///< GlobalAdjustment::SaveSections
+  kImage,             ///< of the keyframe that follows, if it has it still
+  kEndOfOdometry = 199
+};
+
+inline std::uint32_t Tag(Section section) { return static_cast<std::uint32_t>(section); }
+
+namespace internal {
 
 /// What a file of sections is, for its first bytes and for messages.
 struct SectionFileKind {
@@ -40,14 +59,32 @@ struct SectionHeader {
   std::uint64_t like = 0;      ///< 0, or where the section begins that zstd had seen before this one
 };
 
-/// Of all of the header but the checksum, and of what follows it in the file.
+/// Checksum of all of the header but the checksum, and of what follows it in the file.
 std::uint32_t SectionChecksum(const SectionHeader& header, std::string_view stored);
 
 /// A content is at most so many times as long as what is stored of it: what a file needs of memory is known
 /// from its length.
 inline constexpr std::uint64_t kMostSectionGain = 16;
 
-class SectionPacker;
+/// Packs and unpacks one after the other, without loss.
+class SectionPacker {
+ public:
+  /// `like`: bytes that are known when it is unpacked: what repeats them costs next to nothing. `most_gain`:
+  /// no less than this part of the bytes is left. Holds until the next call.
+  std::string_view Pack(std::string_view bytes, std::string_view like, std::size_t most_gain);
+  /// Fills `bytes`, which have their size, with what Pack made of them; false if that is not what it is.
+  bool Unpack(std::string_view packed, std::string_view like, std::string* bytes);
+
+ private:
+  void Fill(std::size_t least);
+  struct Free {
+    void operator()(ZSTD_CCtx_s* context) const;
+    void operator()(ZSTD_DCtx_s* context) const;
+  };
+  std::unique_ptr<ZSTD_CCtx_s, Free> pack_;  // made when they are needed
+  std::unique_ptr<ZSTD_DCtx_s, Free> unpack_;
+  std::string packed_;
+};
 
 /// Writes to a file beside the target (ReplacedFile), which takes the target's place in Finish; without it
 /// nothing is left. So the target is always one complete file, whoever else writes it at the same time. Every
@@ -128,5 +165,6 @@ inline void CheckIndex(int index, int first, int end, const SectionReader& file)
   if (index < first || index >= end) file.Damaged("an index out of range");
 }
 
-}  // namespace tutti::internal
+}  // namespace internal
+}  // namespace tutti
 #pragma GCC visibility pop

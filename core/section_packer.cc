@@ -1,4 +1,4 @@
-#include "core/section_packer.h"
+#include "core/section_file.h"
 
 #include <zstd.h>
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <string>
 #include <unsupported/Eigen/SpecialFunctions>
 
@@ -36,31 +35,6 @@ double IncompleteBeta(double a, double b, double x) {
   using Array1 = Eigen::Array<double, 1, 1>;
   const Array1 value = Eigen::betainc(Array1(a), Array1(b), Array1(x));
   return value(0);
-}
-
-// Of sorted values; q in [0, 1].
-double InterpolatedQuantile(const std::vector<double>& sorted, double q) {
-  const double position = q * static_cast<double>(sorted.size() - 1);
-  const std::size_t below = static_cast<std::size_t>(position);
-  const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (position - std::floor(position)) * (sorted[above] - sorted[below]);
-}
-
-double Ratio(const RatioPart& sum) {
-  return sum.denominator > 0 ? sum.numerator / sum.denominator : std::numeric_limits<double>::quiet_NaN();
-}
-
-void CheckBootstrap(const std::vector<RatioPart>& groups, double confidence, int resamples) {
-  if (groups.empty()) throw InputError("a bootstrap needs at least one group");
-  if (!(confidence > 0 && confidence < 1))
-    throw InputError("a bootstrap's confidence must lie between 0 and 1, such as 0.95");
-  if (resamples < 1) throw InputError("a bootstrap needs at least 1 resample");
-  for (std::size_t i = 0; i < groups.size(); ++i) {
-    const RatioPart& part = groups[i];
-    if (!std::isfinite(part.numerator) || !std::isfinite(part.denominator) || part.denominator < 0)
-      throw InputError("a bootstrap needs finite numbers and denominators of at least 0; group " +
-                       std::to_string(i) + " has none");
-  }
 }
 
 }  // namespace
@@ -122,59 +96,6 @@ PairedTTestResult PairedTTest(const std::vector<double>& a, const std::vector<do
   }
   result.t = result.mean_difference / (deviation / std::sqrt(n));
   result.p = StudentTwoSided(result.t, n - 1.0);
-  return result;
-}
-
-SignTestResult SignTest(const std::vector<double>& a, const std::vector<double>& b) {
-  CheckLengths(a.size(), b.size());
-  int greater = 0;
-  int less = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (std::isnan(a[i]) || std::isnan(b[i]))
-      throw InputError("a sign test needs numbers; pair " + std::to_string(i) + " has none");
-    greater += a[i] > b[i] ? 1 : 0;
-    less += a[i] < b[i] ? 1 : 0;
-  }
-  SignTestResult result = SignTest(greater, less);
-  result.ties = static_cast<int>(a.size()) - greater - less;
-  return result;
-}
-
-SignTestResult SignTest(int greater, int less) {
-  SignTestResult result;
-  result.greater = std::max(0, greater);
-  result.less = std::max(0, less);
-  if (result.greater == 0) return result;
-  // The tail of a binomial is an incomplete beta function (Abramowitz and Stegun 26.5.24).
-  result.p = std::clamp(IncompleteBeta(result.greater, result.less + 1.0, 0.5), 0.0, 1.0);
-  return result;
-}
-
-BootstrapInterval BootstrapRatio(const std::vector<RatioPart>& groups, double confidence, int resamples,
-                                 std::uint64_t seed) {
-  CheckBootstrap(groups, confidence, resamples);
-  const auto add = [](RatioPart& sum, const RatioPart& part) {
-    sum.numerator += part.numerator;
-    sum.denominator += part.denominator;
-  };
-  BootstrapInterval result;
-  RatioPart pooled;
-  for (const RatioPart& part : groups) add(pooled, part);
-  result.ratio = Ratio(pooled);
-  std::mt19937_64 generator(seed);
-  std::vector<double> ratios;
-  for (int r = 0; r < resamples; ++r) {
-    RatioPart sum;
-    // Distributions may differ between standard libraries; the remainder's bias is groups / 2^64.
-    for (std::size_t i = 0; i < groups.size(); ++i) add(sum, groups[generator() % groups.size()]);
-    if (sum.denominator > 0) ratios.push_back(Ratio(sum));
-  }
-  std::sort(ratios.begin(), ratios.end());
-  result.resamples = static_cast<int>(ratios.size());
-  const double tail = 0.5 * (1 - confidence);
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  result.low = ratios.empty() ? kNone : InterpolatedQuantile(ratios, tail);
-  result.high = ratios.empty() ? kNone : InterpolatedQuantile(ratios, 1 - tail);
   return result;
 }
 

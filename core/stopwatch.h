@@ -2,6 +2,10 @@
 #pragma once
 
 #include <chrono>
+#include <map>
+#include <string>
+
+#include "tutti/core/span_recorder.h"
 
 namespace tutti::internal {
 
@@ -32,3 +36,28 @@ class Stopwatch {
 };
 
 }  // namespace tutti::internal
+
+namespace tutti {
+
+/// Where the time of the odometry goes: sums by stage, and spans if somebody asked for them.
+struct StageTimes {
+  std::map<std::string, double> milliseconds;  // summed
+  SpanRecorder* recorder = nullptr;            // not owned; null: sums alone
+};
+
+/// Adds the wall time of a scope to its stage.
+class ScopedStopwatch {
+ public:
+  ScopedStopwatch(StageTimes* times, Lane lane, const char* stage)
+      : sum_(&times->milliseconds[stage]), span_(times->recorder, lane, stage) {}
+  ~ScopedStopwatch() { *sum_ += watch_.Milliseconds(); }
+  ScopedStopwatch(const ScopedStopwatch&) = delete;
+  ScopedStopwatch& operator=(const ScopedStopwatch&) = delete;
+
+ private:
+  double* sum_;
+  ScopedSpan span_;
+  internal::Stopwatch watch_;
+};
+
+}  // namespace tutti

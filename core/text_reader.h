@@ -1,11 +1,15 @@
-// How every text file that somebody gives us is read: a line at a time, within bounds. Internal.
+// How every text file that is given to tutti is read: a line at a time, within bounds; lines of numbers, with
+// errors that name file and line. Internal.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string>
 #include <vector>
+
+#include "tutti/core/trajectory.h"
 
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti::internal {
@@ -29,7 +33,7 @@ class TextReader {
   /// The next line without its line feed; false after the last one. The three bytes with which editors of
   /// Windows begin a text in UTF-8 are left out.
   bool Next(std::string& line);
-  /// Of the line that Next gave last, counted from 1.
+  /// Number of the line that Next gave last, counted from 1.
   std::size_t number() const { return number_; }
 
  private:
@@ -46,6 +50,34 @@ class TextReader {
 /// All of a text file, lines ended by a line feed. Throws InputError as TextReader, and if it is larger than
 /// `most_bytes`.
 std::string ReadText(const std::filesystem::path& file, const std::string& advice, std::size_t most_bytes);
+
+/// The beginning of a word that may be as long as a file, for a message.
+std::string Excerpt(const std::string& word);
+
+/// The first word such as "0,25" of a line whose columns are separated by blanks; empty if there is none.
+std::string DecimalComma(const std::string& line);
+
+/// Throws InputError: "file:line: what".
+[[noreturn]] void FailAt(const std::filesystem::path& file, std::size_t line, const std::string& what);
+
+/// True for a line that begins with '#' or '%'.
+bool IsComment(const std::string& text);
+
+/// Takes a line as it is, before it is split; true: it is no line of numbers.
+using TakesLine = std::function<bool(const std::string& text)>;
+
+/// Calls `use` for each line that carries data; '#' starts a comment, words are parted by blanks, tabs,
+/// commas and semicolons. `names` goes first.
+void ForEachLine(const std::filesystem::path& file,
+                 const std::function<void(std::size_t line, const std::vector<std::string>& words)>& use,
+                 const TakesLine& names = IsComment);
+
+/// The word as a number of sane size.
+double NumberAt(const std::filesystem::path& file, std::size_t line, const std::string& word);
+
+/// From two words, in metres and degrees.
+MotionSigma SigmaAt(const std::filesystem::path& file, std::size_t line, const std::string& translation,
+                    const std::string& rotation);
 
 }  // namespace tutti::internal
 #pragma GCC visibility pop

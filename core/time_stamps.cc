@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <map>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "tutti/core/text.h"
 
 namespace tutti::internal {

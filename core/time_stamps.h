@@ -52,7 +52,8 @@ struct StampsOfNames {
   StampUnit unit = StampUnit::kSeconds;
   std::vector<std::pair<double, std::size_t>> stamps;  ///< [s], ascending, with the place of the name
 };
-/// Of names without folder and ending: the number in each, between text that all have in common
+/// Finds the stamps in names without folder and ending: the number in each, between text that all have in
+/// common
 /// ("frame_1403636579763555584"). Numbers with a point, and whole ones that are too large to count frames,
 /// are stamps. Names that are none are left out; empty if two have the same stamp.
 StampsOfNames FindStamps(const std::vector<std::string>& names);

@@ -3,13 +3,10 @@
 #include <optional>
 #include <utility>
 
-#include "core/number_lines.h"
 #include "core/pose_columns.h"
-#include "core/pose_reader.h"
 #include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "core/time_stamps.h"
-#include "core/tum_line.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"
@@ -58,10 +55,6 @@ TrajectoryFormat ParseTrajectoryFormat(const std::string& name) {
   throw InputError("unknown trajectory format '" + name + "'; use tum, kitti or euroc");
 }
 
-bool HasRotations(const Trajectory& trajectory) {
-  return trajectory.empty() || trajectory.front().pose.rotation.coeffs() != internal::NoRotation().coeffs();
-}
-
 TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
   std::error_code code;
   if (std::filesystem::exists(file, code) && !std::filesystem::is_regular_file(file, code))
@@ -83,19 +76,6 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
     return internal::FormatOfNumbers(text);
   }
   return TrajectoryFormat::kTum;
-}
-
-Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
-                          std::vector<std::string>* warnings, TrajectoryDetails* details,
-                          StampUnit expected) {
-  internal::PoseReader reader(file, format, warnings != nullptr, details != nullptr);
-  TrajectoryDetails found;
-  Trajectory out = reader.Read(expected, found);
-  if (warnings != nullptr) {
-    for (std::string& warning : reader.Warnings(found, expected)) warnings->push_back(std::move(warning));
-  }
-  if (details != nullptr) *details = std::move(found);
-  return out;
 }
 
 std::vector<MotionSigma> ReadMotionSigmas(const std::filesystem::path& file, const Trajectory& trajectory) {

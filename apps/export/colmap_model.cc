@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "apps/export/map_files.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/replaced_file.h"
 
 namespace tutti {

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <unordered_map>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "frontend/geometry/lens_error.h"
 #include "tutti/core/error.h"
 

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/replaced_file.h"
 
 namespace tutti {

@@ -8,7 +8,7 @@
 #include <unordered_set>
 
 #include "apps/export/colmap_model.h"
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

@@ -1,6 +1,6 @@
 // tutti.SlamSystem
-#include "tutti/slam/localizer.h"
 #include "tutti/slam/slam_system.h"
+#include "tutti/slam/localizer.h"
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -26,7 +26,8 @@ struct System {
   std::optional<Localizer> localizer;
   const Odometry* odometry() const { return localizer ? &localizer->odometry() : slam->odometry(); }
   void CheckMaps(const char* what) const {
-    if (localizer) throw InputError(std::string("frames are only being located in the map: it can't ") + what);
+    if (localizer)
+      throw InputError(std::string("frames are only being located in the map: it can't ") + what);
   }
 };
 using Slam = Guarded<System>;
@@ -210,17 +211,19 @@ void BindSlamSystem(py::module_& module) {
       .def(
           "trajectory",
           [](Slam& slam, int piece) {
-            return ArrayOf(WithOdometry(slam, [&](const Odometry& o) { return FrameTrajectory(o.map(), piece); }));
+            return ArrayOf(
+                WithOdometry(slam, [&](const Odometry& o) { return FrameTrajectory(o.map(), piece); }));
           },
           "piece"_a = -1,
-          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::FrameTrajectory)
-              .c_str())
+          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::FrameTrajectory).c_str())
       .def("keyframe_trajectory", &KeyframeTrajectory,
            "(N, 8), as trajectory: of all keyframes, in the order of keyframe_ids.")
       .def("keyframe", &Keyframe, "id"_a, doc::ViewOf)
       .def_property_readonly(
           "keyframe_ids",
-          [](Slam& slam) { return WithOdometry(slam, [](const Odometry& o) { return o.map().KeyframeIds(); }); },
+          [](Slam& slam) {
+            return WithOdometry(slam, [](const Odometry& o) { return o.map().KeyframeIds(); });
+          },
           doc::Map_KeyframeIds)
       .def("landmarks", &Landmarks, "(N, 3) float64: points of the map in the world [m], by id.")
       .def_property_readonly("loops", Locked(&SlamSystem::loops), doc::SlamSystem_loops)
@@ -228,13 +231,11 @@ void BindSlamSystem(py::module_& module) {
           "graph",
           [](Slam& slam) { return std::make_unique<Guarded<PoseGraph>>(Locked(&SlamSystem::Graph)(slam)); },
           doc::SlamSystem_Graph)
-      .def_property_readonly("appearance_only", Locked(&SlamSystem::AppearanceOnly),
-                             doc::SlamSystem_odometry)
+      .def_property_readonly("appearance_only", Locked(&SlamSystem::AppearanceOnly), doc::SlamSystem_odometry)
       .def_property_readonly("corrections", Locked(&SlamSystem::Corrections), doc::SlamReport_corrections)
       .def_property_readonly("relocalized", Locked(&SlamSystem::Relocalized), doc::SlamReport_relocalized)
       .def("take_warnings", Locked(&SlamSystem::TakeWarnings), doc::SlamSystem_TakeWarnings)
-      .def_property_readonly("stage_ms", Locked(&SlamSystem::StageMilliseconds),
-                             doc::SlamReport_stage_ms);
+      .def_property_readonly("stage_ms", Locked(&SlamSystem::StageMilliseconds), doc::SlamReport_stage_ms);
 }
 
 }  // namespace tutti::python

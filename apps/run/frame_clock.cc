@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/stopwatch.h"
 
 namespace tutti {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "apps/run/outputs.h"
-#include "core/tum_line.h"
+#include "core/pose_columns.h"
 
 namespace tutti {
 namespace {

@@ -14,7 +14,7 @@
 #include "apps/run/progress.h"
 #include "apps/run/run_parts.h"
 #include "apps/slam/map_state.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "core/replaced_file.h"
 #include "core/stopwatch.h"
 #include "core/terminal.h"

@@ -5,8 +5,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "core/angle.h"
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

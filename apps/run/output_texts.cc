@@ -10,7 +10,7 @@
 #include "apps/run/outputs.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/run_signs.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/slam/version.h"
 
 namespace tutti {

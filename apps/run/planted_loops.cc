@@ -5,7 +5,7 @@
 #include "apps/run/slam_run.h"
 #include "apps/slam/loop_constraint.h"
 #include "backend/graph/false_loops.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

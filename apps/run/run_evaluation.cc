@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "apps/run/run_parts.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 

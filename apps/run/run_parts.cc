@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -123,7 +123,8 @@ void CollectEarlierSessions(const RunState& state, RunResult& result) {
     const std::int64_t frame = state.odometry->map().keyframe(id).frame_index;
     if (frame >= state.FirstFrame() || state.odometry->map().keyframe(id).piece != pieces.front()) continue;
     const Pose T_world_body = state.odometry->map().keyframe(id).T_world_camera * T_camera_body;
-    result.map->earlier[state.SessionOf(frame)].push_back({state.odometry->map().keyframe(id).stamp_s, T_world_body});
+    result.map->earlier[state.SessionOf(frame)].push_back(
+        {state.odometry->map().keyframe(id).stamp_s, T_world_body});
     result.map->keyframes[frame] = T_world_body;
   }
 }
@@ -156,7 +157,8 @@ void CollectMap(const RunState& state, RunResult& result) {
   const std::vector<int> pieces = FramePieces(odometry.map(), session);
   result.other_pieces.clear();
   for (std::size_t i = 1; i < pieces.size(); ++i)
-    result.other_pieces.push_back(BodyTrajectory(FrameTrajectory(odometry.map(), pieces[i], session), result.rig));
+    result.other_pieces.push_back(
+        BodyTrajectory(FrameTrajectory(odometry.map(), pieces[i], session), result.rig));
   result.in_map = !pieces.empty() && pieces.front() < odometry.LastView().session_piece;
   result.trajectory_odometry = result.trajectory;
   result.stereo_row_error_px = odometry.Report().stereo_row_error_px;

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/terminal.h"
 #include "tutti/frontend/dataset.h"
 

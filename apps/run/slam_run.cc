@@ -182,7 +182,8 @@ void SlamRun::Collect() {
     result_.cpu_s += result_.focal_length_of_map->cpu_s;
   }
   if (!alone_) return;
-  result_.trajectory_odometry = BodyTrajectory(FrameTrajectory(alone_->Tracked().map(), -1, session), result_.rig);
+  result_.trajectory_odometry =
+      BodyTrajectory(FrameTrajectory(alone_->Tracked().map(), -1, session), result_.rig);
 }
 
 void SlamRun::NoteJoining(const MapSession& own) {

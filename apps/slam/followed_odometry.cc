@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

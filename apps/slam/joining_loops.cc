@@ -11,7 +11,7 @@
 #include "apps/slam/loop_solver.h"
 #include "apps/slam/missed_loops.h"
 #include "apps/slam/odometry_uncertainty.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

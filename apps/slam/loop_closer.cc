@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "apps/slam/odometry_jumps.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "core/stopwatch.h"
 #include "frontend/map/fuse.h"
 #include "frontend/map/prune.h"

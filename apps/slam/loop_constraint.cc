@@ -6,9 +6,8 @@
 #include <utility>
 
 #include "apps/slam/landmark_matches.h"
-#include "core/angle.h"
 #include "core/dense_solvers.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {

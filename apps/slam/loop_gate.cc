@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "backend/robust/loop_agreement.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "core/stopwatch.h"
 
 namespace tutti {

@@ -8,7 +8,7 @@
 
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_state.h"
-#include "core/sections.h"
+#include "core/section_file.h"
 #include "core/state_archive.h"
 #include "frontend/odometry/odometry_file.h"
 #include "loopclosure/detector/detector_file.h"

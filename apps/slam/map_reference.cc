@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

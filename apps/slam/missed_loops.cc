@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "apps/slam/loop_constraint.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

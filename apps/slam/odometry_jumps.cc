@@ -6,8 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/angle.h"
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

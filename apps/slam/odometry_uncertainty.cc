@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

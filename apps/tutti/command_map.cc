@@ -118,13 +118,12 @@ void Prune(const std::filesystem::path& file, const std::filesystem::path& out) 
   const double megabytes = Megabytes(file);
   const std::filesystem::path& written = out.empty() ? file : out;
   internal::CheckWritable(written, internal::Needs::kFile);
-  const std::unique_ptr<SlamSystem> slam =
-      LoadMap(file, info, nullptr, [&file](internal::SectionReader& in) {
-        if (in.Peek() == internal::kEndOfSections) return;
-        throw InputError(file.string() +
-                         ": is a checkpoint; let its run finish (tutti run --resume), and prune the map that "
-                         "it leaves");
-      });
+  const std::unique_ptr<SlamSystem> slam = LoadMap(file, info, nullptr, [&file](internal::SectionReader& in) {
+    if (in.Peek() == internal::kEndOfSections) return;
+    throw InputError(file.string() +
+                     ": is a checkpoint; let its run finish (tutti run --resume), and prune the map that "
+                     "it leaves");
+  });
   slam->Prune();
   slam->Snapshot(info.note).Write(written);
   const MapInfo after = ReadMapInfo(written);

@@ -16,7 +16,7 @@
 #include "apps/tutti/files.h"
 #include "apps/tutti/options.h"
 #include "apps/tutti/text_table.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 

@@ -6,8 +6,8 @@
 #include <tuple>
 #include <utility>
 
-#include "apps/report/run_report.h"
 #include "apps/report/page.h"
+#include "apps/report/run_report.h"
 #include "apps/tutti/files.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"

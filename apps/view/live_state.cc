@@ -18,8 +18,8 @@ std::vector<LivePlace> PlacesOf(const RunState& state) {
   for (const int id : odometry.map().KeyframeIds()) {
     if (id >= state.end_of_map) break;
     const std::int64_t frame = odometry.map().keyframe(id).frame_index;
-    places.push_back(
-        {id, frame, odometry.map().keyframe(id).piece, state.SessionOf(frame), odometry.map().keyframe(id).T_world_camera});
+    places.push_back({id, frame, odometry.map().keyframe(id).piece, state.SessionOf(frame),
+                      odometry.map().keyframe(id).T_world_camera});
   }
   return places;
 }

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "backend/evaluation/evaluation_path.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -284,7 +283,8 @@ EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajector
     Project(options.plane, out.poses.reference, a);
     Project(options.plane, out.poses.estimate, b);
   }
-  out.path_length_m = PathLengths(a).back();
+  for (std::size_t k = 1; k < a.size(); ++k)
+    out.path_length_m += (a[k].translation - a[k - 1].translation).norm();
   out.absolute = AbsoluteErrors(a, b);
   out.ate = Summarize(out.absolute.translation);
   if (!out.rotations) out.absolute.rotation_deg = out.absolute.full = {};

@@ -1,12 +1,15 @@
+// How an estimate is laid over its reference, and the words for that.
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/umeyama.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 
 namespace tutti {
-
 namespace {
 
 /// The positions that the alignment is computed from.
@@ -23,7 +26,51 @@ Eigen::Vector3d Mean(const std::vector<Eigen::Vector3d>& points) {
   return mean;
 }
 
+/// Position of the word; the lists below are in the order of their enumerations.
+std::size_t PlaceOf(const std::vector<std::string>& names, const std::string& name, const char* what) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  throw InputError(std::string("unknown ") + what + " '" + name + "'; use one of " + JoinText(names));
+}
+
 }  // namespace
+
+const std::vector<std::string>& TrajectoryAlignmentNames() {
+  static const std::vector<std::string> names = {"none", "origin", "se3", "sim3", "scale", "yaw"};
+  return names;
+}
+
+TrajectoryAlignment ParseTrajectoryAlignment(const std::string& name) {
+  return static_cast<TrajectoryAlignment>(PlaceOf(TrajectoryAlignmentNames(), name, "alignment"));
+}
+
+const char* ToString(TrajectoryAlignment alignment) {
+  return TrajectoryAlignmentNames().at(static_cast<std::size_t>(alignment)).c_str();
+}
+
+const std::vector<std::string>& DeltaUnitNames() {
+  static const std::vector<std::string> names = {"frames", "metres", "degrees", "seconds", "radians"};
+  return names;
+}
+
+DeltaUnit ParseDeltaUnit(const std::string& name) {
+  return static_cast<DeltaUnit>(PlaceOf(DeltaUnitNames(), name, "unit"));
+}
+
+const char* ToString(DeltaUnit unit) { return DeltaUnitNames().at(static_cast<std::size_t>(unit)).c_str(); }
+
+const std::vector<std::string>& ProjectionPlaneNames() {
+  static const std::vector<std::string> names = {"none", "xy", "xz", "yz"};
+  return names;
+}
+
+ProjectionPlane ParseProjectionPlane(const std::string& name) {
+  return static_cast<ProjectionPlane>(PlaceOf(ProjectionPlaneNames(), name, "plane"));
+}
+
+const char* ToString(ProjectionPlane plane) {
+  return ProjectionPlaneNames().at(static_cast<std::size_t>(plane)).c_str();
+}
 
 Similarity AlignPoints(const std::vector<Eigen::Vector3d>& reference,
                        const std::vector<Eigen::Vector3d>& estimate, bool with_scale) {
@@ -102,6 +149,22 @@ Similarity AlignPoses(const AssociatedPoses& poses, const EvaluationOptions& opt
 
 Pose ApplyAlignment(const Similarity& S, const Pose& pose) {
   return Pose((S.rotation * pose.rotation).normalized(), S * pose.translation);
+}
+
+Eigen::Vector3d RollPitchYaw(const Eigen::Matrix3d& R) {
+  const double across = std::hypot(R(0, 0), R(1, 0)), pitch = std::atan2(-R(2, 0), across);
+  if (across <= 4 * std::numeric_limits<double>::epsilon()) return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0};
+  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
+}
+
+PoseMatrix ProjectToPlane(const PoseMatrix& pose, ProjectionPlane plane) {
+  if (plane == ProjectionPlane::kNone) return pose;
+  const int normal = plane == ProjectionPlane::kXY ? 2 : plane == ProjectionPlane::kXZ ? 1 : 0;
+  PoseMatrix out = pose;
+  out.translation[normal] = 0;
+  const double angle = RollPitchYaw(pose.rotation)[normal];
+  out.rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(normal)).toRotationMatrix();
+  return out;
 }
 
 }  // namespace tutti

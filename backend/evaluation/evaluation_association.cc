@@ -1,9 +1,11 @@
+// Which poses are compared, and how much of the reference they are.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <iterator>
 #include <limits>
 
+#include "core/numbers.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 
@@ -59,6 +61,44 @@ void AddPair(AssociatedPoses& out, const Trajectory& reference, const Trajectory
   out.stamps_s.push_back(estimate[e].stamp_s);
   out.reference.push_back(reference[r].pose);
   out.estimate.push_back(estimate[e].pose);
+}
+
+/// Stamps are not quite even: a gap this much short of a whole number of intervals is one.
+constexpr double kUneven = 0.1;  // [intervals]
+
+std::vector<double> Stamps(const Trajectory& trajectory, double offset_s) {
+  std::vector<double> out;
+  for (const StampedPose& pose : trajectory) out.push_back(pose.stamp_s + offset_s);
+  return out;
+}
+
+double MedianInterval(const std::vector<double>& stamps) {
+  std::vector<double> intervals;
+  for (std::size_t k = 1; k < stamps.size(); ++k) intervals.push_back(stamps[k] - stamps[k - 1]);
+  return intervals.empty() ? 0 : internal::Median(std::move(intervals));
+}
+
+std::vector<double> Within(const std::vector<double>& stamps, double first, double last) {
+  std::vector<double> out;
+  std::copy_if(stamps.begin(), stamps.end(), std::back_inserter(out),
+               [&](double stamp) { return stamp >= first && stamp <= last; });
+  return out;
+}
+
+std::size_t Whole(double intervals) {
+  return intervals > 0 ? static_cast<std::size_t>(std::floor(intervals + kUneven)) : 0;
+}
+
+TrajectoryCoverage CoverageOfFrames(const std::vector<double>& frames, const std::vector<double>& poses,
+                                    double tolerance_s) {
+  const double near = std::min(tolerance_s, 0.5 * MedianInterval(frames));
+  TrajectoryCoverage out;
+  out.all = frames.size();
+  for (const double frame : frames) {
+    const auto after = std::lower_bound(poses.begin(), poses.end(), frame - near);
+    if (after != poses.end() && *after <= frame + near) ++out.posed;
+  }
+  return out;
 }
 
 }  // namespace
@@ -145,6 +185,63 @@ AssociatedPoses AssociateByIndex(const Trajectory& reference, const Trajectory& 
   }
   AssociatedPoses out;
   for (std::size_t k = 0; k < reference.size(); ++k) AddPair(out, reference, estimate, k, k);
+  return out;
+}
+
+std::vector<std::size_t> EvenlySpacedPoses(std::size_t poses, std::size_t count) {
+  std::vector<std::size_t> out;
+  const bool all = poses <= count;
+  const double step =
+      all || count < 2 ? 1.0 : static_cast<double>(poses - 1) / static_cast<double>(count - 1);
+  for (std::size_t k = 0; k < std::min(poses, count); ++k)
+    out.push_back(static_cast<std::size_t>(std::floor(static_cast<double>(k) * step)));
+  if (count > 1 && !all) out.back() = poses - 1;
+  return out;
+}
+
+std::vector<std::size_t> MovedPoses(const Trajectory& trajectory, const MotionFilter& filter) {
+  std::vector<std::size_t> out;
+  double path = 0, path_of_last = 0;
+  for (std::size_t k = 0; k < trajectory.size(); ++k) {
+    const Pose& pose = trajectory[k].pose;
+    if (k > 0) path += (pose.translation - trajectory[k - 1].pose.translation).norm();
+    const bool counts =
+        out.empty() || path - path_of_last >= filter.distance_m ||
+        internal::kDegrees *
+                LogSO3(trajectory[out.back()].pose.rotation.conjugate() * pose.rotation).norm() >=
+            filter.angle_deg;
+    if (!counts) continue;
+    out.push_back(k);
+    path_of_last = path;
+  }
+  return out;
+}
+
+TrajectoryCoverage CoverageOf(const Trajectory& reference, const Trajectory& estimate, double offset_s,
+                              double tolerance_s, const std::vector<double>& frame_stamps_s) {
+  TrajectoryCoverage out;
+  if (reference.empty() || estimate.empty()) return out;
+  const double begin = reference.front().stamp_s, end = reference.back().stamp_s;
+  const std::vector<double> all = Stamps(estimate, offset_s);
+  if (!frame_stamps_s.empty()) {
+    std::vector<double> frames = frame_stamps_s;
+    for (double& stamp : frames) stamp += offset_s;
+    return CoverageOfFrames(Within(frames, begin - tolerance_s, end + tolerance_s), all, tolerance_s);
+  }
+  const std::vector<double> poses = Within(all, begin - tolerance_s, end + tolerance_s);
+  double interval = MedianInterval(all);
+  if (!(interval > 0)) interval = MedianInterval(Stamps(reference, 0));
+  out.posed = out.all = poses.size();
+  if (!(interval > 0)) return out;
+  if (poses.empty()) {
+    out.all = Whole((end - begin) / interval) + 1;
+    return out;
+  }
+  out.all += Whole((poses.front() - begin) / interval) + Whole((end - poses.back()) / interval);
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    const auto steps = static_cast<std::size_t>(std::llround((poses[k] - poses[k - 1]) / interval));
+    if (steps > 1) out.all += steps - 1;
+  }
   return out;
 }
 

@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backend/evaluation/evaluation_path.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 
@@ -13,6 +12,17 @@ namespace {
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
 constexpr double kStampEpsilon = 1e-9;  // a second is a second, whatever the last bit says [s]
+
+/// Distance along the path from the first pose to each [m]. `T` has a member `translation`.
+template <typename T>
+std::vector<double> PathLengths(const std::vector<T>& poses) {
+  std::vector<double> out;
+  out.reserve(poses.size());
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    out.push_back(k == 0 ? 0.0 : out.back() + (poses[k].translation - poses[k - 1].translation).norm());
+  }
+  return out;
+}
 
 Pairs PairsByFrames(std::size_t n, std::size_t delta, bool all_pairs) {
   Pairs out;

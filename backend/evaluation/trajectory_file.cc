@@ -15,16 +15,12 @@
 namespace tutti {
 namespace {
 
-TrajectoryFormat CoreFormat(PoseFileFormat format) {
-  switch (format) {
-    case PoseFileFormat::kKitti:
-      return TrajectoryFormat::kKitti;
-    case PoseFileFormat::kEuroc:
-      return TrajectoryFormat::kEuroc;
-    default:
-      return TrajectoryFormat::kTum;
-  }
-}
+static_assert(static_cast<int>(PoseFileFormat::kTum) == static_cast<int>(TrajectoryFormat::kTum) &&
+              static_cast<int>(PoseFileFormat::kKitti) == static_cast<int>(TrajectoryFormat::kKitti) &&
+              static_cast<int>(PoseFileFormat::kEuroc) == static_cast<int>(TrajectoryFormat::kEuroc));
+
+/// For all but kG2o.
+TrajectoryFormat CoreFormat(PoseFileFormat format) { return static_cast<TrajectoryFormat>(format); }
 
 /// The first word that carries data; empty if there is none.
 std::string FirstWord(const std::filesystem::path& file) {
@@ -119,15 +115,7 @@ PoseFileFormat GuessPoseFileFormat(const std::filesystem::path& file) {
   if (word == "FIX" || word.rfind("VERTEX", 0) == 0 || word.rfind("EDGE", 0) == 0 ||
       word.rfind("PARAMS", 0) == 0)
     return PoseFileFormat::kG2o;
-  switch (GuessTrajectoryFormat(file)) {
-    case TrajectoryFormat::kKitti:
-      return PoseFileFormat::kKitti;
-    case TrajectoryFormat::kEuroc:
-      return PoseFileFormat::kEuroc;
-    case TrajectoryFormat::kTum:
-      break;
-  }
-  return PoseFileFormat::kTum;
+  return static_cast<PoseFileFormat>(GuessTrajectoryFormat(file));
 }
 
 PoseFile ReadPoseFile(const std::filesystem::path& file, std::optional<PoseFileFormat> format,

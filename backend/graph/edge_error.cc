@@ -7,35 +7,25 @@
 namespace tutti::internal {
 
 template <int N>
-EdgeConstants<N> MakeEdgeConstants(const PoseGraphEdge& edge, GraphObjective objective) {
-  EdgeConstants<N> c;
+EdgeError<N>::EdgeError(const PoseGraphEdge& edge, GraphObjective objective) {
   const Similarity& m = edge.measurement;
-  c.rotation_inverse = m.rotation.conjugate();
-  c.rotation_transposed = c.rotation_inverse.toRotationMatrix();
-  c.translation = m.translation;
-  c.inverse_scale = N == 7 ? 1.0 / m.scale : 1.0;
-  c.log_scale = N == 7 ? std::log(m.scale) : 0.0;
-  c.heading = N == 3 ? Heading(m.rotation) : 0.0;
-  const std::array<int, N> order = SolverOrder<N>();
-  Eigen::Matrix<double, N, N> information;
-  for (int r = 0; r < N; ++r) {
-    for (int k = 0; k < N; ++k) {
-      information(r, k) =
-          edge.information(order[static_cast<std::size_t>(r)], order[static_cast<std::size_t>(k)]);
-    }
-  }
-  c.sqrt_information = UpperCholesky(information).upper;
-  c.log_rotation = objective == GraphObjective::kChi2Log;
-  return c;
+  rotation_inverse = m.rotation.conjugate();
+  rotation_transposed = rotation_inverse.toRotationMatrix();
+  translation = m.translation;
+  inverse_scale = N == 7 ? 1.0 / m.scale : 1.0;
+  log_scale = N == 7 ? std::log(m.scale) : 0.0;
+  heading = N == 3 ? Heading(m.rotation) : 0.0;
+  sqrt_information = UpperCholesky(InSolverOrder<N>(edge.information)).upper;
+  log_rotation = objective == GraphObjective::kChi2Log;
 }
 
 namespace {
 
-// Of a 3D edge: N = 6 or 7.
+// The error of an edge in space: N = 6 or 7.
 template <int N>
-void EdgeError3(const EdgeConstants<N>& c, const double* block_i, const double* block_j,
-                Eigen::Matrix<double, N, 1>& error, Eigen::Matrix<double, N, N>* jacobian_i,
-                Eigen::Matrix<double, N, N>* jacobian_j) {
+void EvaluateInSpace(const EdgeError<N>& c, const double* block_i, const double* block_j,
+                     Eigen::Matrix<double, N, 1>& error, Eigen::Matrix<double, N, N>* jacobian_i,
+                     Eigen::Matrix<double, N, N>* jacobian_j) {
   constexpr int kRotation = N - 3;
   const Eigen::Map<const Eigen::Vector3d> ti(block_i), tj(block_j);
   const Eigen::Map<const Eigen::Quaterniond> qi(block_i + kRotation), qj(block_j + kRotation);
@@ -77,8 +67,8 @@ void EdgeError3(const EdgeConstants<N>& c, const double* block_i, const double* 
   }
 }
 
-void EdgeError2(const EdgeConstants<3>& c, const double* block_i, const double* block_j,
-                Eigen::Vector3d& error, Eigen::Matrix3d* jacobian_i, Eigen::Matrix3d* jacobian_j) {
+void EvaluateInPlane(const EdgeError<3>& c, const double* block_i, const double* block_j,
+                     Eigen::Vector3d& error, Eigen::Matrix3d* jacobian_i, Eigen::Matrix3d* jacobian_j) {
   const double ci = std::cos(block_i[2]), si = std::sin(block_i[2]);
   const Eigen::Vector2d step(block_j[0] - block_i[0], block_j[1] - block_i[1]);
   Eigen::Matrix2d Ri_transposed;
@@ -100,27 +90,25 @@ void EdgeError2(const EdgeConstants<3>& c, const double* block_i, const double* 
 }  // namespace
 
 template <int N>
-void EdgeError(const EdgeConstants<N>& c, const double* block_i, const double* block_j,
-               Eigen::Matrix<double, N, 1>& error, Eigen::Matrix<double, N, N>* jacobian_i,
-               Eigen::Matrix<double, N, N>* jacobian_j) {
+void EdgeError<N>::Evaluate(const double* block_i, const double* block_j, Vector& error, Square* jacobian_i,
+                            Square* jacobian_j) const {
   if constexpr (N == 3) {
-    EdgeError2(c, block_i, block_j, error, jacobian_i, jacobian_j);
+    EvaluateInPlane(*this, block_i, block_j, error, jacobian_i, jacobian_j);
   } else {
-    EdgeError3<N>(c, block_i, block_j, error, jacobian_i, jacobian_j);
+    EvaluateInSpace<N>(*this, block_i, block_j, error, jacobian_i, jacobian_j);
   }
 }
 
 template <int N>
-void WhitenedError(const EdgeConstants<N>& constants, const double* block_i, const double* block_j,
-                   Eigen::Matrix<double, N, 1>& residual, Eigen::Matrix<double, N, N>* jacobian_i,
-                   Eigen::Matrix<double, N, N>* jacobian_j) {
-  Eigen::Matrix<double, N, 1> error;
-  Eigen::Matrix<double, N, N> J[2];
-  EdgeError<N>(constants, block_i, block_j, error, jacobian_i != nullptr ? &J[0] : nullptr,
-               jacobian_j != nullptr ? &J[1] : nullptr);
-  residual.noalias() = constants.sqrt_information * error;
-  if (jacobian_i != nullptr) jacobian_i->noalias() = constants.sqrt_information * J[0];
-  if (jacobian_j != nullptr) jacobian_j->noalias() = constants.sqrt_information * J[1];
+void EdgeError<N>::EvaluateWhitened(const double* block_i, const double* block_j, Vector& residual,
+                                    Square* jacobian_i, Square* jacobian_j) const {
+  Vector error;
+  Square J[2];
+  Evaluate(block_i, block_j, error, jacobian_i != nullptr ? &J[0] : nullptr,
+           jacobian_j != nullptr ? &J[1] : nullptr);
+  residual.noalias() = sqrt_information * error;
+  if (jacobian_i != nullptr) jacobian_i->noalias() = sqrt_information * J[0];
+  if (jacobian_j != nullptr) jacobian_j->noalias() = sqrt_information * J[1];
 }
 
 template <int N>
@@ -150,34 +138,14 @@ Similarity BlockToPose(const double* block) {
   return pose;
 }
 
-template EdgeConstants<3> MakeEdgeConstants<3>(const PoseGraphEdge&, GraphObjective);
-template void EdgeError<3>(const EdgeConstants<3>&, const double*, const double*,
-                           Eigen::Matrix<double, 3, 1>&, Eigen::Matrix<double, 3, 3>*,
-                           Eigen::Matrix<double, 3, 3>*);
-template void WhitenedError<3>(const EdgeConstants<3>&, const double*, const double*,
-                               Eigen::Matrix<double, 3, 1>&, Eigen::Matrix<double, 3, 3>*,
-                               Eigen::Matrix<double, 3, 3>*);
+template struct EdgeError<3>;
+template struct EdgeError<6>;
+template struct EdgeError<7>;
 template void PoseToBlock<3>(const Similarity&, double*);
-template Similarity BlockToPose<3>(const double*);
-
-template EdgeConstants<6> MakeEdgeConstants<6>(const PoseGraphEdge&, GraphObjective);
-template void EdgeError<6>(const EdgeConstants<6>&, const double*, const double*,
-                           Eigen::Matrix<double, 6, 1>&, Eigen::Matrix<double, 6, 6>*,
-                           Eigen::Matrix<double, 6, 6>*);
-template void WhitenedError<6>(const EdgeConstants<6>&, const double*, const double*,
-                               Eigen::Matrix<double, 6, 1>&, Eigen::Matrix<double, 6, 6>*,
-                               Eigen::Matrix<double, 6, 6>*);
 template void PoseToBlock<6>(const Similarity&, double*);
-template Similarity BlockToPose<6>(const double*);
-
-template EdgeConstants<7> MakeEdgeConstants<7>(const PoseGraphEdge&, GraphObjective);
-template void EdgeError<7>(const EdgeConstants<7>&, const double*, const double*,
-                           Eigen::Matrix<double, 7, 1>&, Eigen::Matrix<double, 7, 7>*,
-                           Eigen::Matrix<double, 7, 7>*);
-template void WhitenedError<7>(const EdgeConstants<7>&, const double*, const double*,
-                               Eigen::Matrix<double, 7, 1>&, Eigen::Matrix<double, 7, 7>*,
-                               Eigen::Matrix<double, 7, 7>*);
 template void PoseToBlock<7>(const Similarity&, double*);
+template Similarity BlockToPose<3>(const double*);
+template Similarity BlockToPose<6>(const double*);
 template Similarity BlockToPose<7>(const double*);
 
 }  // namespace tutti::internal

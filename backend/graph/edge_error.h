@@ -18,19 +18,6 @@
 
 namespace tutti::internal {
 
-/// What an edge needs again and again. Coordinates of the error and the tangent are in *solver order*:
-/// kSE2 (x, y, heading), kSE3 (t, r), kSim3 (t, log s, r).
-template <int N>
-struct EdgeConstants {
-  Eigen::Quaterniond rotation_inverse;  ///< R_ij^-1
-  Eigen::Matrix3d rotation_transposed;  ///< R_ij^T
-  Eigen::Vector3d translation;          ///< t_ij
-  double inverse_scale = 1, log_scale = 0;
-  double heading = 0;                            ///< kSE2
-  Eigen::Matrix<double, N, N> sqrt_information;  ///< S with S^T S = information: the *upper* Cholesky factor
-  bool log_rotation = true;                      ///< chi2log
-};
-
 /// Heading of a rotation about z [rad], (-pi, pi].
 inline double Heading(const Eigen::Quaterniond& q) { return 2.0 * std::atan2(q.z(), q.w()); }
 inline double WrapAngle(double a) { return a - 2.0 * M_PI * std::floor((a + M_PI) / (2.0 * M_PI)); }
@@ -43,23 +30,51 @@ inline std::array<int, N> SolverOrder() {
   if constexpr (N == 7) return {0, 1, 2, 6, 3, 4, 5};
 }
 
-/// For N = 3, 6, 7, as all below: edge_error.cc alone compiles them.
+/// The part of an information matrix that edges of N coordinates use.
 template <int N>
-EdgeConstants<N> MakeEdgeConstants(const PoseGraphEdge& edge, GraphObjective objective);
+Eigen::Matrix<double, N, N> InSolverOrder(const Matrix7d& information) {
+  const std::array<int, N> order = SolverOrder<N>();
+  return information(order, order);
+}
 
-/// Error of an edge, not whitened. Blocks: [x, y, heading], [t, q] or [t, log s, q]. Jacobians (N x N, solver
-/// order) may be null.
+/// Whitened error r = S e of one edge, and its Jacobians S de/dx with respect to its two ends.
 template <int N>
-void EdgeError(const EdgeConstants<N>& c, const double* block_i, const double* block_j,
-               Eigen::Matrix<double, N, 1>& error, Eigen::Matrix<double, N, N>* jacobian_i,
-               Eigen::Matrix<double, N, N>* jacobian_j);
+struct LinearizedEdge {
+  Eigen::Matrix<double, N, 1> error;
+  Eigen::Matrix<double, N, N> jacobian[2];
+};
 
-/// Whitened error r = S e of one edge; its Jacobians with respect to the two tangents where asked for (null:
-/// not).
+/// The error of one edge as a function of its two ends, and what it needs again and again. Coordinates of the
+/// error and the tangent are in *solver order*: kSE2 (x, y, heading), kSE3 (t, r), kSim3 (t, log s, r).
+/// Blocks: [x, y, heading], [t, q] or [t, log s, q]. For N = 3, 6, 7, as all below: edge_error.cc alone
+/// compiles them.
 template <int N>
-void WhitenedError(const EdgeConstants<N>& constants, const double* block_i, const double* block_j,
-                   Eigen::Matrix<double, N, 1>& residual, Eigen::Matrix<double, N, N>* jacobian_i,
-                   Eigen::Matrix<double, N, N>* jacobian_j);
+struct EdgeError {
+  using Vector = Eigen::Matrix<double, N, 1>;
+  using Square = Eigen::Matrix<double, N, N>;
+
+  EdgeError(const PoseGraphEdge& edge, GraphObjective objective);
+
+  /// The error, not whitened; its Jacobians with respect to the two tangents where asked for (null: not).
+  void Evaluate(const double* block_i, const double* block_j, Vector& error, Square* jacobian_i,
+                Square* jacobian_j) const;
+  /// Whitened: r = S e.
+  void EvaluateWhitened(const double* block_i, const double* block_j, Vector& residual, Square* jacobian_i,
+                        Square* jacobian_j) const;
+  LinearizedEdge<N> Linearized(const double* block_i, const double* block_j) const {
+    LinearizedEdge<N> out;
+    EvaluateWhitened(block_i, block_j, out.error, &out.jacobian[0], &out.jacobian[1]);
+    return out;
+  }
+
+  Eigen::Quaterniond rotation_inverse;  ///< R_ij^-1
+  Eigen::Matrix3d rotation_transposed;  ///< R_ij^T
+  Eigen::Vector3d translation;          ///< t_ij
+  double inverse_scale = 1, log_scale = 0;
+  double heading = 0;                            ///< kSE2
+  Eigen::Matrix<double, N, N> sqrt_information;  ///< S with S^T S = information: the *upper* Cholesky factor
+  bool log_rotation = true;                      ///< chi2log
+};
 
 /// Number of doubles of a node's block.
 template <int N>

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/text_input.h"
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

@@ -1,8 +1,9 @@
-#include "backend/graph/odometry_edges.h"
-
+// Which nodes follow each other?
 #include <algorithm>
 #include <cctype>
 #include <numeric>
+
+#include "backend/graph/graph_structure.h"
 
 namespace tutti {
 namespace internal {

@@ -98,15 +98,15 @@ bool KeyframeGraph::OfOnePiece(int older, int newer) const {
   return piece == b->piece;
 }
 
-const KeyframeGraph::Edge* KeyframeGraph::Kept(int older, int newer) const {
+const KeyframeGraph::Edge* KeyframeGraph::FindEdge(const std::vector<Edge>& edges, int older, int newer) {
   const Edge wanted{older, newer, {}};
-  const auto at = std::lower_bound(kept_.begin(), kept_.end(), wanted, Before<Edge>);
-  return at != kept_.end() && at->older == older && at->newer == newer ? &*at : nullptr;
+  const auto at = std::lower_bound(edges.begin(), edges.end(), wanted, Before<Edge>);
+  return at != edges.end() && at->older == older && at->newer == newer ? &*at : nullptr;
 }
 
 // Kept from before a correction, or as the map is.
 Similarity KeyframeGraph::Measured(int older, int newer) const {
-  const Edge* kept = Kept(older, newer);
+  const Edge* kept = FindEdge(kept_, older, newer);
   return kept != nullptr ? kept->S_older_newer
                          : Similarity(At(older).T_world_keyframe.Inverse() * At(newer).T_world_keyframe);
 }
@@ -194,7 +194,7 @@ std::vector<CovisiblePair> KeyframeGraph::Strongest(const std::vector<CovisibleP
     // Keyframes that a loop brought together see common landmarks too; that is the loop's edge, not the
     // odometry's.
     const bool recent =
-        kept_.empty() || c.newer - c.older < kRecentKeyframes || Kept(c.older, c.newer) != nullptr;
+        kept_.empty() || c.newer - c.older < kRecentKeyframes || FindEdge(kept_, c.older, c.newer) != nullptr;
     if (recent && !Follows(c.older, c.newer) && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
   }
   std::sort(candidates.begin(), candidates.end(), [](const CovisiblePair& a, const CovisiblePair& b) {
@@ -281,7 +281,7 @@ Eigen::Vector2d KeyframeGraph::Walked(int keyframe) const {
   return after == walked_.begin() ? Eigen::Vector2d::Zero() : std::prev(after)->second;
 }
 
-// The same of one keyframe to another, but for the steps to outliers and from them.
+// Variances from one keyframe to another, but for the steps to outliers and from them.
 Eigen::Vector2d KeyframeGraph::WalkedBetween(int older, int newer) const {
   Eigen::Vector2d walked = Walked(newer) - Walked(older);
   std::set<int> steps;  // keyframes that they lead to
@@ -303,8 +303,8 @@ bool KeyframeGraph::Unknown(const Edge& edge) const {
          outliers_.count(edge.newer) != 0;
 }
 
-// Of (translation, rotation, log scale). Over several steps errors of length add up as if they were all in
-// one direction: that makes up for what the turns between them do to the end.
+// Standard deviations of (translation, rotation, log scale). Over several steps errors of length add up as if
+// they were all in one direction: that makes up for what the turns between them do to the end.
 Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {
   const double steps = std::sqrt(edge.steps);
   const Eigen::Vector2d walked = WalkedBetween(edge.older, edge.newer).cwiseSqrt();
@@ -364,7 +364,7 @@ KeyframeCorrection KeyframeGraph::Optimize(const std::vector<LoopEdge>& loops) c
 }
 
 KeyframeGraphProof KeyframeGraph::Prove(const std::vector<LoopEdge>& loops) const {
-  // Of the objective, and in its unit: another valley, not another end of the same.
+  // A share of the objective, and in its unit: another valley, not another end of the same.
   constexpr double kLower = 1e-3, kLeast = 1e-3;
   KeyframeGraphProof out;
   std::optional<PoseGraph> best;

@@ -50,16 +50,10 @@ Matrix7d LessSure(const Matrix7d& information, const Matrix7d& covariance) {
 
 }  // namespace
 
-// As measured; two keyframes without an edge are where the map has them.
+// The edge is as measured; two keyframes without one are where the map has them.
 KeyframeGraph::Edge KeyframeGraph::Between(int older, int newer) const {
-  const auto before = [](const Edge& edge, const Ends& ends) { return Ends(edge.older, edge.newer) < ends; };
-  const auto at = std::lower_bound(edges_.begin(), edges_.end(), Ends(older, newer), before);
-  if (at != edges_.end() && at->older == older && at->newer == newer) return *at;
-  Edge edge;
-  edge.older = older;
-  edge.newer = newer;
-  edge.S_older_newer = Similarity(At(older).T_world_keyframe.Inverse() * At(newer).T_world_keyframe);
-  return edge;
+  if (const Edge* edge = FindEdge(edges_, older, newer)) return *edge;
+  return {older, newer, Similarity(At(older).T_world_keyframe.Inverse() * At(newer).T_world_keyframe)};
 }
 
 void KeyframeGraph::Remove(const std::map<int, int>& into) {
@@ -104,7 +98,7 @@ void KeyframeGraph::Remove(const std::map<int, int>& into) {
     edges_.push_back(edge);
     if (carried.count(ends) != 0) carried_.push_back(edge);
     // Where all is measured from the map, so is the sum.
-    if (!kept_.empty() && (joined.count(ends) != 0 || Kept(edge.older, edge.newer) != nullptr))
+    if (!kept_.empty() && (joined.count(ends) != 0 || FindEdge(kept_, edge.older, edge.newer) != nullptr))
       kept.push_back(edge);
   }
   kept_ = std::move(kept);
@@ -113,7 +107,7 @@ void KeyframeGraph::Remove(const std::map<int, int>& into) {
                    keyframes_.end());
 }
 
-// Of the tangent (translation, rotation, log scale): S Exp(d) = Exp(Adjoint(S) d) S.
+// Adjoint of the tangent (translation, rotation, log scale): S Exp(d) = Exp(Adjoint(S) d) S.
 Matrix7d KeyframeGraph::Adjoint(const Similarity& S) const {
   const Eigen::Matrix3d R = S.rotation.toRotationMatrix();
   Matrix7d adjoint = Matrix7d::Identity();

@@ -5,14 +5,13 @@
 #include <limits>
 #include <utility>
 
-#include "backend/graph/edge_weights.h"
 #include "backend/graph/graph_structure.h"
 #include "backend/robust/cluster_search.h"
 #include "backend/robust/robust_solver.h"
 #include "backend/solver/chordal_descent.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/solver/graph_problem.h"
-#include "backend/solver/measurement_start.h"
+#include "backend/solver/robust_loss.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
@@ -24,7 +23,6 @@ using internal::GraphStructure;
 using internal::Stopwatch;
 
 /// One optimisation; the class only keeps what its steps share.
-template <int N>
 class Run {
  public:
   Run(PoseGraph& graph, const GraphStructure& anchored, const PoseGraphOptions& options,
@@ -35,9 +33,9 @@ class Run {
         options_(options),
         stop_(stop),
         report_(report),
-        problem_(graph, structure_, options),
-        robust_(problem_, options, graph.edges().size(),
-                [this](int iterations) { return SolveOnce(iterations); }) {
+        owned_problem_(internal::MakeGraphProblem(graph, structure_, options)),
+        problem_(*owned_problem_),
+        robust_(problem_, options, solve_once_) {
     problem_.SetStop(stop);
     if (problem_.HasMeasurements()) SolvedByCeres("the block solver knows neither landmarks nor priors");
   }
@@ -76,7 +74,8 @@ class Run {
   /// false loops have bent loses to the odometry.
   bool Solve() {
     starts_.resize(1);
-    const bool robust = options_.robust != RobustLoss::kNone && robust_.HasLoops() && !LeastSquaresSuffices();
+    const bool robust =
+        options_.robust != RobustLoss::kNone && !robust_.loops().empty() && !LeastSquaresSuffices();
     if (robust || !plain_.empty() ? !SolveRobustly(robust) : !SolveFromEach()) {
       if (report_.reason.empty()) report_.reason = "the solver found no usable step";
       return false;
@@ -138,9 +137,7 @@ class Run {
 
   void ReconsiderClusters() {
     const std::string termination = report_.termination, reason = report_.reason;
-    internal::ClusterSearch<N> search(graph_, options_, problem_, robust_,
-                                      [this](int iterations) { return SolveOnce(iterations); });
-    if (search.Improve()) return;
+    if (internal::SearchClusters(problem_, options_, robust_, solve_once_)) return;
     report_.termination = termination;
     report_.reason = reason;
   }
@@ -296,18 +293,19 @@ class Run {
   const PoseGraphOptions& options_;
   const internal::StopRequest& stop_;
   PoseGraphReport& report_;
-  GraphProblem<N> problem_;
-  internal::RobustSolver<N> robust_;
+  const std::unique_ptr<GraphProblem> owned_problem_;
+  GraphProblem& problem_;
+  const std::function<bool(int)> solve_once_ = [this](int iterations) { return SolveOnce(iterations); };
+  internal::RobustSolver robust_;
   std::vector<Start> starts_;
   std::vector<Similarity> plain_;  ///< the least-squares solution, where it suffices
   Stopwatch watch_;
 };
 
-template <int N>
-void OptimizeAs(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
-                const internal::StopRequest& stop, PoseGraphReport& report) {
+void OptimizeFromStarts(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
+                        const internal::StopRequest& stop, PoseGraphReport& report) {
   const Stopwatch watch;
-  Run<N> run(graph, structure, options, stop, report);
+  Run run(graph, structure, options, stop, report);
   const bool initialized = run.CollectStarts();
   report.init_time_s = watch.Seconds();
   if (initialized && run.Solve()) {
@@ -316,21 +314,6 @@ void OptimizeAs(PoseGraph& graph, const GraphStructure& structure, const PoseGra
   } else {
     report.termination = "failed";
     report.costs = EvaluateCosts(graph);
-  }
-}
-
-void OptimizeKind(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
-                  const internal::StopRequest& stop, PoseGraphReport& report) {
-  switch (graph.kind()) {
-    case GraphKind::kSE2:
-      OptimizeAs<3>(graph, structure, options, stop, report);
-      break;
-    case GraphKind::kSE3:
-      OptimizeAs<6>(graph, structure, options, stop, report);
-      break;
-    case GraphKind::kSim3:
-      OptimizeAs<7>(graph, structure, options, stop, report);
-      break;
   }
 }
 
@@ -352,7 +335,7 @@ PoseGraphReport PoseGraphOptimizer::Optimize(PoseGraph& graph, const std::functi
     report.termination = "nothing to do";
   } else {
     try {
-      OptimizeKind(graph, structure, options_, stop, report);
+      OptimizeFromStarts(graph, structure, options_, stop, report);
     } catch (const internal::Stopped&) {
       PoseGraphReport stopped;
       stopped.solver = options_.solver;

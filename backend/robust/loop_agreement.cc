@@ -1,12 +1,18 @@
 #include "backend/robust/loop_agreement.h"
 
 #include <algorithm>
+#include <numeric>
 
-#include "backend/graph/odometry_edges.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/uncertainty/edge_covariance.h"
 
 namespace tutti::internal {
+namespace {
+
+/// Both ends of two loops of a cluster are within so many nodes of each other.
+constexpr std::size_t kClusterReach = 10;
+
+}  // namespace
 
 MeasuredLoop MeasuredLoop::Reversed() const {
   return {edge, to, from, measurement.Inverse(), Transported(covariance, measurement)};
@@ -63,6 +69,39 @@ double LoopAgreement::CycleChi2(const MeasuredLoop& a, const MeasuredLoop& b) co
                               Between(a.to, b.to, rest.Inverse() * T[b.to].Inverse()) +
                               Between(b.from, a.from, T[a.from].Inverse());
   return Mahalanobis(LogSE3(E), covariance, kind_);
+}
+
+std::vector<LoopCluster> ClusterLoops(const PoseGraph& graph, const GraphStructure& structure,
+                                      GraphObjective objective, double threshold) {
+  const LoopAgreement agreement(graph, structure, objective);
+  std::vector<MeasuredLoop> loops;
+  for (const MeasuredLoop& loop : agreement.loops())
+    loops.push_back(loop.from < loop.to ? loop : loop.Reversed());
+  std::stable_sort(loops.begin(), loops.end(),
+                   [](const MeasuredLoop& a, const MeasuredLoop& b) { return a.from < b.from; });
+  std::vector<std::size_t> parent(loops.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  for (std::size_t a = 0; a < loops.size(); ++a) {
+    for (std::size_t b = a + 1; b < loops.size() && loops[b].from <= loops[a].from + kClusterReach; ++b) {
+      const auto [low, high] = std::minmax(loops[a].to, loops[b].to);
+      if (high > low + kClusterReach || RootOf(parent, a) == RootOf(parent, b)) continue;
+      if (!agreement.HasOdometry(loops[a].from, loops[b].from) ||
+          !agreement.HasOdometry(loops[a].to, loops[b].to))
+        continue;
+      if (agreement.CycleChi2(loops[a], loops[b]) <= threshold) parent[RootOf(parent, b)] = RootOf(parent, a);
+    }
+  }
+  std::vector<LoopCluster> clusters;
+  std::vector<std::size_t> cluster_of(loops.size(), loops.size());
+  for (std::size_t k = 0; k < loops.size(); ++k) {
+    std::size_t& cluster = cluster_of[RootOf(parent, k)];
+    if (cluster == loops.size()) {
+      cluster = clusters.size();
+      clusters.emplace_back();
+    }
+    clusters[cluster].push_back(loops[k].edge);
+  }
+  return clusters;
 }
 
 }  // namespace tutti::internal

@@ -1,4 +1,5 @@
-// Do two loops agree with each other through the odometry between their ends? Private to the back end.
+// Loops that agree with each other through the odometry between their ends, and so stand or fall together.
+// Private to the back end.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +27,7 @@ struct MeasuredLoop {
   Pose measurement;              ///< T_from_to; the scale of Sim(3) is left out
   Matrix6d covariance;           ///< as a perturbation of the frame of `to` [m^2, m rad, rad^2]
 
-  /// The same loop as its other end sees it.
+  /// This loop as its other end sees it.
   MeasuredLoop Reversed() const;
 };
 
@@ -53,5 +54,15 @@ class LoopAgreement {
   std::vector<Matrix6d> covariance_;  // of the way from the chain's start, in world coordinates
   std::vector<int> segment_;          // nodes of different segments have no odometry between them
 };
+
+/// Positions in edges() of the loops of one cluster, by their earlier end.
+using LoopCluster = std::vector<std::size_t>;
+
+/// The loops of a graph in clusters: two loops whose ends are within a few nodes of each other, and that
+/// agree through the odometry between (chi-square of the cycle <= `threshold`), are of one cluster, and so is
+/// what they share neighbours with (single linkage). Such loops do not err independently: what deceived the
+/// detector at one place deceives it one frame later, too (Latif, Cadena, Neira, IJRR 2013).
+std::vector<LoopCluster> ClusterLoops(const PoseGraph& graph, const GraphStructure& structure,
+                                      GraphObjective objective, double threshold);
 
 }  // namespace tutti::internal

@@ -19,7 +19,7 @@ class BlockSystem {
  public:
   using Block = Eigen::Matrix<double, N, N>;
 
-  /// As BlockCholesky::Analyse.
+  /// Analyses the pattern (BlockCholesky::Analyse).
   void Analyse(int size, std::vector<std::pair<int, int>> pairs);
 
   /// Solves in place; the blocks are as those of BlockCholesky::Factorise. False if the matrix is not

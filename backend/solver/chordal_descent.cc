@@ -2,12 +2,11 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "backend/graph/edge_weights.h"
-#include "backend/solver/block_pattern.h"
 #include "backend/solver/block_system.h"
 #include "core/least_squares.h"
 #include "core/stopwatch.h"
@@ -20,11 +19,6 @@ struct ChordalEdge {
   Eigen::Matrix3d R;  ///< R_ij
   Eigen::Vector3d t;  ///< t_ij
   double kappa = 1, tau = 1;
-};
-
-struct Frame {
-  Eigen::Quaterniond q;
-  Eigen::Vector3d t;
 };
 
 ChordalEdge MakeChordalEdge(const PoseGraphEdge& edge, GraphKind kind) {
@@ -42,23 +36,24 @@ struct SecondOrder {
   Eigen::Matrix3d curvature_ii, curvature_jj;  ///< what the exact one has more, in the rotations
 };
 
-double Cost(const ChordalEdge& edge, const Frame& i, const Frame& j) {
-  const Eigen::Matrix3d Ri = i.q.toRotationMatrix();
-  return edge.kappa * (j.q.toRotationMatrix() - Ri * edge.R).squaredNorm() +
-         edge.tau * (j.t - i.t - Ri * edge.t).squaredNorm();
+double Cost(const ChordalEdge& edge, const Similarity& i, const Similarity& j) {
+  const Eigen::Matrix3d Ri = i.rotation.toRotationMatrix();
+  const Eigen::Vector3d step = i.scale * (Ri * edge.t);
+  return edge.kappa * (j.rotation.toRotationMatrix() - Ri * edge.R).squaredNorm() +
+         edge.tau * (j.translation - i.translation - step).squaredNorm();
 }
 
 /// With E = R_ij^T R_i^T R_j, the rotations' part is 2 kappa (3 - tr E), and tr(Exp(-R_ij^T a) E Exp(b)) is
 /// expanded to second order; the translations' part is tau ||R_i^T (t_j - t_i) - Exp(a) t_ij||^2.
-SecondOrder Expand(const ChordalEdge& edge, const Frame& i, const Frame& j) {
+SecondOrder Expand(const ChordalEdge& edge, const Similarity& i, const Similarity& j) {
   SecondOrder out;
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d Ri = i.q.toRotationMatrix(), Rj = j.q.toRotationMatrix();
+  const Eigen::Matrix3d Ri = i.rotation.toRotationMatrix(), Rj = j.rotation.toRotationMatrix();
   const Eigen::Matrix3d E = edge.R.transpose() * Ri.transpose() * Rj;
   const double k2 = 2 * edge.kappa, t2 = 2 * edge.tau;
   const Eigen::Vector3d odd(E(2, 1) - E(1, 2), E(0, 2) - E(2, 0), E(1, 0) - E(0, 1));
   const Eigen::Matrix3d even = (E.trace() - 2) * identity - 0.5 * (E + E.transpose());
-  const Eigen::Vector3d r = Ri.transpose() * (j.t - i.t) - edge.t;
+  const Eigen::Vector3d r = Ri.transpose() * (j.translation - i.translation) - edge.t;
   const Eigen::Matrix3d T = Skew(edge.t), pull = t2 * Ri * T;
   out.cost = edge.kappa * (Rj - Ri * edge.R).squaredNorm() + edge.tau * r.squaredNorm();
   out.gradient_j << t2 * (Ri * r), k2 * odd;
@@ -82,9 +77,10 @@ class ChordalDescent {
 
   ChordalDescent(const PoseGraph& graph, const GraphStructure& structure,
                  const std::vector<Similarity>& poses)
-      : structure_(structure), pattern_(BlockPattern::OfMovingNodes(structure)) {
+      : structure_(structure),
+        pattern_(structure.ends, structure.constant, std::vector<bool>(structure.ends.size(), true)),
+        poses_(poses) {
     for (const PoseGraphEdge& edge : graph.edges()) edges_.push_back(MakeChordalEdge(edge, graph.kind()));
-    for (const Similarity& pose : poses) frames_.push_back({pose.rotation, pose.translation});
     system_.Analyse(pattern_.unknowns, pattern_.pairs);
   }
 
@@ -108,7 +104,7 @@ class ChordalDescent {
         if (!region.Shrink()) return Unusable("the normal equations of the chordal cost have no solution");
         continue;
       }
-      const std::vector<Frame> before = frames_;
+      const std::vector<Similarity> before = poses_;
       Move();
       const double change = cost_ - Cost();
       // What lowers the cost by no more than its rounding can still lower the gradient.
@@ -118,7 +114,7 @@ class ChordalDescent {
         if (!last) Linearise();
         out.converged = last;
       } else {
-        frames_ = before;
+        poses_ = before;
         region.radius = std::min(region.radius, limits.trust_region);  // beyond, it damps nothing
         out.converged = last || !region.Shrink();
       }
@@ -126,13 +122,7 @@ class ChordalDescent {
     return out;
   }
 
-  void Take(std::vector<Similarity>& poses) const {
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      if (structure_.constant[k]) continue;
-      poses[k].rotation = frames_[k].q;
-      poses[k].translation = frames_[k].t;
-    }
-  }
+  const std::vector<Similarity>& poses() const { return poses_; }
 
  private:
   static constexpr double kMinQuality = 1e-3;  // least share of the expected decrease that makes a step
@@ -157,7 +147,7 @@ class ChordalDescent {
   double Cost() const {
     double sum = 0;
     for (std::size_t e = 0; e < edges_.size(); ++e)
-      sum += internal::Cost(edges_[e], frames_[structure_.ends[e].from], frames_[structure_.ends[e].to]);
+      sum += internal::Cost(edges_[e], poses_[structure_.ends[e].from], poses_[structure_.ends[e].to]);
     return sum;
   }
 
@@ -170,7 +160,7 @@ class ChordalDescent {
     cost_ = 0;
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       const EdgeEnds& ends = structure_.ends[e];
-      const SecondOrder f = Expand(edges_[e], frames_[ends.from], frames_[ends.to]);
+      const SecondOrder f = Expand(edges_[e], poses_[ends.from], poses_[ends.to]);
       cost_ += f.cost;
       const int i = pattern_.unknown[ends.from], j = pattern_.unknown[ends.to];
       if (i >= 0) AddEnd(static_cast<std::size_t>(i), f.H_ii, f.curvature_ii, f.gradient_i);
@@ -210,20 +200,20 @@ class ChordalDescent {
   }
 
   void Move() {
-    for (std::size_t k = 0; k < frames_.size(); ++k) {
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
       if (pattern_.unknown[k] < 0) continue;
       const Eigen::Matrix<double, N, 1> d = step_.segment<N>(N * pattern_.unknown[k]);
       Vector6d tangent = Vector6d::Zero();
       tangent(Used()) = d;
-      frames_[k].t += tangent.head<3>();
-      frames_[k].q = (frames_[k].q * ExpSO3(tangent.tail<3>())).normalized();
+      poses_[k].translation += tangent.head<3>();
+      poses_[k].rotation = (poses_[k].rotation * ExpSO3(tangent.tail<3>())).normalized();
     }
   }
 
   const GraphStructure& structure_;
   BlockPattern pattern_;
   std::vector<ChordalEdge> edges_;  // parallel to edges
-  std::vector<Frame> frames_;       // parallel to nodes
+  std::vector<Similarity> poses_;   // parallel to nodes
   double cost_ = 0;
   std::vector<Block> diagonal_, curvature_, off_diagonal_;
   Eigen::VectorXd gradient_, step_;
@@ -235,11 +225,21 @@ SolveSummary Minimise(const PoseGraph& graph, const GraphStructure& structure, c
                       std::vector<Similarity>& poses) {
   ChordalDescent<N> descent(graph, structure, poses);
   SolveSummary summary = descent.Minimise(limits);
-  if (summary.usable) descent.Take(poses);
+  if (summary.usable) poses = descent.poses();
   return summary;
 }
 
 }  // namespace
+
+ChordalWeights MakeChordalWeights(const PoseGraphEdge& edge, GraphKind kind) {
+  if (kind == GraphKind::kSE2) {
+    const Eigen::Matrix2d tt = edge.information.topLeftCorner<2, 2>();
+    return {edge.information(5, 5), 2.0 / tt.inverse().trace()};
+  }
+  const Eigen::Matrix3d tt = edge.information.topLeftCorner<3, 3>();
+  const Eigen::Matrix3d rr = edge.information.block<3, 3>(3, 3);
+  return {3.0 / (2.0 * rr.inverse().trace()), 3.0 / tt.inverse().trace()};
+}
 
 SolveSummary MinimiseChordal(const PoseGraph& graph, const GraphStructure& structure, int max_iterations,
                              double max_time_s, std::vector<Similarity>& poses, const StopRequest& stop) {
@@ -251,14 +251,11 @@ SolveSummary MinimiseChordal(const PoseGraph& graph, const GraphStructure& struc
                                          : Minimise<6>(graph, structure, limits, poses);
 }
 
-double ChordalCost(const PoseGraph& graph, const GraphStructure& structure,
-                   const std::vector<Similarity>& poses) {
+double ChordalCost(const PoseGraph& graph, const std::vector<Similarity>& poses) {
   double sum = 0;
-  for (std::size_t e = 0; e < structure.ends.size(); ++e) {
-    const Similarity &i = poses[structure.ends[e].from], &j = poses[structure.ends[e].to];
-    sum += Cost(MakeChordalEdge(graph.edges()[e], graph.kind()), {i.rotation, i.translation},
-                {j.rotation, j.translation});
-  }
+  for (const PoseGraphEdge& edge : graph.edges())
+    sum += Cost(MakeChordalEdge(edge, graph.kind()), poses[graph.IndexOf(edge.from)],
+                poses[graph.IndexOf(edge.to)]);
   return sum;
 }
 

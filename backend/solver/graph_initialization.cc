@@ -5,22 +5,12 @@
 #include <cmath>
 #include <deque>
 
-#include "backend/graph/edge_weights.h"
+#include "backend/solver/chordal_descent.h"
 
 namespace tutti::internal {
 namespace {
 
 using Triplets = std::vector<Eigen::Triplet<double>>;
-
-/// Position of each moving node among the unknowns; -1 for constant ones.
-std::vector<int> NumberUnknowns(const GraphStructure& structure, int& count) {
-  std::vector<int> out(structure.constant.size(), -1);
-  count = 0;
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    if (!structure.constant[i]) out[i] = count++;
-  }
-  return out;
-}
 
 /// Least squares over x_i in R^D (several right sides at once): sum of w ||x_j - M x_i - b||^2 over the
 /// edges, by the normal equations. Constant nodes enter with their values.
@@ -31,7 +21,7 @@ class LinearGraphProblem {
   using Value = Eigen::Matrix<double, D, Columns>;
 
   LinearGraphProblem(const GraphStructure& structure, std::vector<Value> constants)
-      : unknown_(NumberUnknowns(structure, count_)), values_(std::move(constants)) {
+      : unknown_(NumberUnknowns(structure.constant, count_)), values_(std::move(constants)) {
     rhs_ = Eigen::MatrixXd::Zero(D * count_, Columns);
     diagonal_.assign(static_cast<std::size_t>(count_), Block::Zero());
     triplets_.reserve(structure.ends.size() * D * D + static_cast<std::size_t>(count_) * D * D);

@@ -1,81 +1,94 @@
-// What is to be minimised for a pose graph, with weights that GNC changes. Private to the back end.
+// What is to be minimised for a pose graph, with weights that robust losses change. Private to the back end.
+//
+// Those who decide where to start and which loops to believe know no number of coordinates and are compiled
+// once; those who compute see the problem as a WeightedGraph<N> (weighted_graph.h).
 #pragma once
 
+#include <ceres/loss_function.h>
+
 #include <algorithm>
+#include <cstddef>
+#include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
-#include "backend/solver/graph_solver.h"
-#include "backend/solver/linearized_edge.h"
-#include "backend/solver/robust_loss.h"
+#include "backend/graph/graph_structure.h"
+#include "tutti/backend/pose_graph.h"
+#include "tutti/backend/pose_graph_optimizer.h"
 
 namespace tutti::internal {
 
-template <int N>
+/// True when the caller does not want the result any more; empty: never.
+using StopRequest = std::function<bool()>;
+
+/// Thrown out of the solvers, to whoever has taken the request from the caller. Nobody else sees it.
+struct Stopped {};
+
+inline void ThrowIfStopped(const StopRequest& stop) {
+  if (stop && stop()) throw Stopped();
+}
+
+/// Pose graphs are close to quadratic once initialised: start near Gauss-Newton, let the region shrink if
+/// that fails.
+constexpr double kInitialTrustRegion = 1e8;
+
+struct SolveLimits {
+  int max_iterations = 200;
+  double max_time_s = 0;  ///< 0: no limit
+  double function_tolerance = 1e-9;
+  double trust_region = kInitialTrustRegion;  ///< radius to begin with, in Ceres' sense [1]
+  StopRequest stop;                           ///< asked before each iteration; Stopped is thrown then
+};
+
+/// How a solve ended.
+struct SolveSummary {
+  bool usable = false;  ///< the poses are no worse than before
+  bool converged = false;
+  int iterations = 0;                         ///< rejected steps included
+  double trust_region = kInitialTrustRegion;  ///< radius at the end
+  std::string message;                        ///< why not usable
+};
+
+/// 1/2 sum rho(w e^T Omega e) over the edges, rho on loops only, as a function of the nodes that are not
+/// constant. Edges of weight 0 are no part of the system of equations, and neither is their fill-in.
 class GraphProblem {
  public:
-  GraphProblem(const PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options)
-      : graph_(graph),
-        options_(options),
-        threshold_(options.robust_chi2 > 0 ? options.robust_chi2 : ChiSquare99(N)) {
-    weighted_.structure = &structure;
-    weighted_.blocks.resize(graph.nodes().size() * WeightedGraph<N>::kBlock);
-    weighted_.weights.assign(graph.edges().size(), 1.0);
-    for (const PoseGraphEdge& edge : graph.edges()) {
-      weighted_.constants.push_back(MakeEdgeConstants<N>(edge, options.objective));
-      weighted_.is_loop.push_back(edge.kind == EdgeKind::kLoop);
-    }
-    weighted_.terms = std::make_unique<MeasurementTerms<N>>(graph, options.objective);
-    solver_ = MakeGraphSolver<N>(HasMeasurements() ? PoseGraphSolver::kCeres : options.solver);
-  }
+  /// All of them outlive this object.
+  GraphProblem(const PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options);
+  virtual ~GraphProblem() = default;
+
+  const PoseGraph& graph() const { return graph_; }
+  const GraphStructure& structure() const { return structure_; }
+  /// Coordinates of a node: 3, 6 or 7.
+  int dimension() const { return static_cast<int>(TangentCoordinates(graph_.kind()).size()); }
 
   /// Chi-square beyond which a loop is doubted.
   double threshold() const { return threshold_; }
   void SetThreshold(double threshold) { threshold_ = threshold; }
 
-  /// Of the nodes, and behind them of the landmarks, which are where they were if they are left out.
-  void SetPoses(const std::vector<Similarity>& poses) {
-    const std::size_t nodes = graph_.nodes().size();
-    for (std::size_t k = 0; k < nodes; ++k) PoseToBlock<N>(poses[k], weighted_.Block(k));
-    for (std::size_t k = nodes; k < poses.size(); ++k)
-      weighted_.terms->SetLandmark(k - nodes, poses[k].translation);
-  }
-  std::vector<Similarity> Poses() const {
-    std::vector<Similarity> poses;
-    poses.reserve(graph_.nodes().size() + weighted_.terms->Landmarks());
-    for (std::size_t k = 0; k < graph_.nodes().size(); ++k)
-      poses.push_back(BlockToPose<N>(weighted_.Block(k)));
-    for (std::size_t k = 0; k < weighted_.terms->Landmarks(); ++k)
-      poses.emplace_back(1.0, Eigen::Quaterniond::Identity(), weighted_.terms->Landmark(k));
-    return poses;
-  }
+  /// Poses of the nodes, and behind them of the landmarks, which are where they were if they are left out.
+  virtual void SetPoses(const std::vector<Similarity>& poses) = 0;
+  virtual std::vector<Similarity> Poses() const = 0;
   /// Landmarks' or priors.
-  bool HasMeasurements() const { return !weighted_.terms->Empty(); }
+  bool HasMeasurements() const { return !graph_.measurements().empty(); }
 
   /// e^T Omega e of one edge, weight not applied.
-  double EdgeChi2(std::size_t e) const { return weighted_.Chi2(e); }
-  bool IsLoop(std::size_t e) const { return weighted_.is_loop[e]; }
-  LinearizedEdge<N> Linearized(std::size_t e) const {
-    const EdgeEnds& ends = structure().ends[e];
-    return Linearize<N>(weighted_.constants[e], weighted_.Block(ends.from), weighted_.Block(ends.to));
-  }
-  const GraphStructure& structure() const { return *weighted_.structure; }
-
+  virtual double EdgeChi2(std::size_t e) const = 0;
+  bool IsLoop(std::size_t e) const { return graph_.edges()[e].kind == EdgeKind::kLoop; }
   /// What the options ask to minimise (no 1/2), at the present poses.
-  double Objective() const {
-    double sum = 0;
-    for (std::size_t e = 0; e < weighted_.weights.size(); ++e)
-      sum += IsLoop(e) ? RobustCost(options_.robust, EdgeChi2(e), threshold_) : EdgeChi2(e);
-    if (HasMeasurements()) sum += weighted_.terms->Chi2(weighted_.blocks.data());
-    return sum;
-  }
+  double Objective() const;
 
   /// The loss on loop edges from now on; nullptr: least squares.
-  void SetLoss(ceres::LossFunction* owned) { weighted_.loss.reset(owned); }
+  void SetLoss(ceres::LossFunction* owned) { loss_.reset(owned); }
+  ceres::LossFunction* loss() const { return loss_.get(); }
 
-  double weight(std::size_t e) const { return weighted_.weights[e]; }
-  const std::vector<double>& weights() const { return weighted_.weights; }
-  void SetWeight(std::size_t e, double weight) { weighted_.weights[e] = weight; }
+  double weight(std::size_t e) const { return weights_[e]; }
+  /// Parallel to the edges, >= 0. They do not move in memory.
+  const std::vector<double>& weights() const { return weights_; }
+  void SetWeight(std::size_t e, double weight) { weights_[e] = weight; }
+  /// The edges that count.
+  std::vector<bool> Active() const;
 
   /// The next solution goes on with the trust region that the last one ended with, instead of a wide one. For
   /// rounds of few iterations, which would spend them all on narrowing it.
@@ -84,22 +97,27 @@ class GraphProblem {
   /// Solve() asks it before each iteration, and throws Stopped.
   void SetStop(StopRequest stop) { stop_ = std::move(stop); }
 
-  SolveSummary Solve(int max_iterations, double max_time_s) {
-    SolveSummary summary = solver_->Solve(
-        weighted_, {max_iterations, max_time_s, options_.function_tolerance, trust_region_, stop_});
-    last_trust_region_ = summary.trust_region;
-    trust_region_ = kInitialTrustRegion;
-    return summary;
-  }
+  SolveSummary Solve(int max_iterations, double max_time_s);
+
+ protected:
+  virtual double MeasurementChi2() const = 0;
+  virtual SolveSummary Minimise(const SolveLimits& limits) = 0;
 
  private:
   const PoseGraph& graph_;
+  const GraphStructure& structure_;
   const PoseGraphOptions& options_;
   double threshold_;
+  std::vector<double> weights_;
+  std::unique_ptr<ceres::LossFunction> loss_;
   StopRequest stop_;
   double trust_region_ = kInitialTrustRegion, last_trust_region_ = kInitialTrustRegion;
-  WeightedGraph<N> weighted_;
-  std::unique_ptr<GraphSolver<N>> solver_;  // last: refers to the graph
 };
+
+std::unique_ptr<GraphProblem> MakeGraphProblem(const PoseGraph& graph, const GraphStructure& structure,
+                                               const PoseGraphOptions& options);
+
+/// EvaluateCosts at other poses: of the nodes, and behind them of the landmarks.
+GraphCosts CostsAt(const PoseGraph& graph, const std::vector<Similarity>& poses);
 
 }  // namespace tutti::internal

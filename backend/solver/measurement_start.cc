@@ -1,9 +1,9 @@
-#include "backend/solver/measurement_start.h"
-
+// Where landmarks and priors are when a solution starts.
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
+#include "backend/solver/graph_initialization.h"
 #include "core/umeyama.h"
 
 namespace tutti::internal {

@@ -19,20 +19,11 @@ class MeasurementCost final : public ceres::CostFunction {
 
  public:
   MeasurementCost(const PoseGraphMeasurement& measurement, GraphObjective objective)
-      : bearing_(measurement.bearing),
-        is_bearing_(measurement.what == PoseGraphMeasurement::What::kBearing),
-        ends_{measurement.from, measurement.to} {
-    PoseGraphEdge edge;
-    edge.measurement = is_bearing_ ? Similarity() : measurement.value;
-    constants_ = MakeEdgeConstants<N>(edge, objective);
-    const std::array<int, N> order = SolverOrder<N>();
-    SmallMatrix information(N, N);
-    for (int r = 0; r < N; ++r) {
-      for (int c = 0; c < N; ++c)
-        information(r, c) =
-            measurement.information(order[static_cast<std::size_t>(r)], order[static_cast<std::size_t>(c)]);
-    }
-    const Eigenpairs eigen = SymmetricEigen(information);
+      : is_bearing_(measurement.what == PoseGraphMeasurement::What::kBearing),
+        bearing_(measurement.bearing),
+        ends_{measurement.from, measurement.to},
+        edge_({0, 0, is_bearing_ ? Similarity() : measurement.value, Matrix7d::Identity()}, objective) {
+    const Eigenpairs eigen = SymmetricEigen(InSolverOrder<N>(measurement.information));
     root_ = eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
     if (is_bearing_) root_bearing_ = std::sqrt(std::max(0.0, measurement.information(0, 0)));
     set_num_residuals(is_bearing_ ? 1 : N);
@@ -52,7 +43,7 @@ class MeasurementCost final : public ceres::CostFunction {
     for (std::size_t e = 0; e < 2; ++e) PlaceEnd(e, parameters, blocks[e], moved[e]);
     Vector error;
     Square J[2];
-    EdgeError<N>(constants_, blocks[0], blocks[1], error, &J[0], &J[1]);
+    edge_.Evaluate(blocks[0], blocks[1], error, &J[0], &J[1]);
     Eigen::Matrix<double, Eigen::Dynamic, N> root = root_;
     if (is_bearing_) {
       // A landmark at the sensor has no direction: it is moved by its other measurements.
@@ -98,11 +89,11 @@ class MeasurementCost final : public ceres::CostFunction {
     PoseToBlock<N>(pose, block);
   }
 
-  EdgeConstants<N> constants_;
-  Square root_;  // root^T root = information, which may be singular
-  double root_bearing_ = 0, bearing_;
   bool is_bearing_;
+  double bearing_, root_bearing_ = 0;
   MeasurementEnd ends_[2];
+  EdgeError<N> edge_;
+  Square root_;  // root^T root = information, which may be singular
   std::size_t block_of_[2] = {0, 0};
 };
 

@@ -24,8 +24,6 @@ class MeasurementTerms {
 
   MeasurementTerms(const PoseGraph& graph, GraphObjective objective);
 
-  bool Empty() const { return terms_.empty(); }
-  std::size_t Landmarks() const { return fixed_.size(); }
   Eigen::Vector3d Landmark(std::size_t k) const;
   void SetLandmark(std::size_t k, const Eigen::Vector3d& position);
 

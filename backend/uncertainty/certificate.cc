@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "backend/graph/edge_weights.h"
 #include "backend/graph/graph_structure.h"
 #include "backend/solver/block_cholesky.h"
-#include "backend/solver/block_pattern.h"
 #include "backend/solver/chordal_descent.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
@@ -45,12 +42,11 @@ class CertificateMatrix {
   CertificateMatrix(const PoseGraph& graph, const std::vector<Similarity>& solution,
                     const GraphStructure& structure)
       : structure_(structure), diagonal_(graph.nodes().size(), Block::Zero()) {
-    std::vector<std::size_t> edges(graph.edges().size()), nodes(graph.nodes().size());
-    std::iota(edges.begin(), edges.end(), std::size_t{0});
-    std::iota(nodes.begin(), nodes.end(), std::size_t{0});
-    const internal::BlockPattern pattern(structure.ends, edges, nodes, nodes.size());
+    const std::size_t edges = graph.edges().size();
+    const internal::BlockPattern pattern(structure.ends, std::vector<bool>(graph.nodes().size(), false),
+                                         std::vector<bool>(edges, true));
     off_diagonal_.assign(pattern.pairs.size(), Block::Zero());
-    for (const std::size_t e : edges) {
+    for (std::size_t e = 0; e < edges; ++e) {
       AddEdge(structure.ends[e], graph.edges()[e],
               internal::MakeChordalWeights(graph.edges()[e], graph.kind()), solution,
               off_diagonal_[pattern.pair_of_edge[e]]);
@@ -199,7 +195,7 @@ Certificate Certify(const PoseGraph& graph, const CertificateOptions& options,
                      " poses, the graph has " + std::to_string(graph.nodes().size()));
   }
   out.available = true;
-  out.chordal = internal::ChordalCost(graph, structure, chordal_optimum);
+  out.chordal = internal::ChordalCost(graph, chordal_optimum);
   if (graph.kind() == GraphKind::kSE2) {
     Bound<2>(graph, chordal_optimum, structure, options, stop, out);
   } else {

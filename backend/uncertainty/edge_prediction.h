@@ -1,9 +1,9 @@
-// How far off may an edge be that is not in the graph yet? Private to the back end.
+// What do the other edges say about one: how far off may it be that is not in the graph yet, and how well
+// does it agree with them that is? Private to the back end.
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/SparseCore>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "backend/solver/graph_problem.h"
@@ -21,36 +21,25 @@ struct PredictedEdge {
 /// the graph rises by if the edge joins it (the innovation of a Kalman filter). L^-1 J^T of the Cholesky
 /// factor H = L L^T is enough, and has entries only on the ways of the edge's ends to the root of the
 /// elimination tree.
-template <int N>
 class EdgePrediction {
  public:
-  explicit EdgePrediction(const GraphProblem<N>& problem);
+  virtual ~EdgePrediction() = default;
 
   /// Reads the weights and the poses. False if the edges of weight 1 do not hold the graph together.
-  bool Update();
-
-  PredictedEdge Of(std::size_t e);
-
- private:
-  using Square = Eigen::Matrix<double, N, N>;
-  using Row = Eigen::Matrix<double, 1, N>;
-  static std::size_t At(int k) { return static_cast<std::size_t>(k); }
-
-  /// The way from a column to the root, as far as it is new.
-  void ClimbFrom(int column, std::vector<int>& columns);
-  void Eliminate(int column);
-
-  const GraphProblem<N>& problem_;
-  int size_ = 0;  // before row_, which sets it
-  std::vector<int> row_;
-  Eigen::SparseMatrix<double> L_;  // the factor, permuted
-  Eigen::VectorXi place_;          // of each row of H in L
-  std::vector<Row> solution_;      // zero between calls
-  std::vector<bool> reached_;      // false between calls
+  virtual bool Update() = 0;
+  virtual PredictedEdge Of(std::size_t e) = 0;
 };
 
-extern template class EdgePrediction<3>;
-extern template class EdgePrediction<6>;
-extern template class EdgePrediction<7>;
+/// `problem` outlives it.
+std::unique_ptr<EdgePrediction> MakeEdgePrediction(const GraphProblem& problem);
+
+/// Chi-square of each of these edges, all of weight 1, against the solution without it (the externally
+/// studentised residual of regression diagnostics; Cook and Weisberg, 1982); `problem` is at an optimum of
+/// its weights, each 0 or 1. With r the whitened error in the solution, H the graph's information matrix and
+/// P = J H^-1 J^T it is r^T (I - P)^-1 r: to first order what the graph's cost falls by when the edge leaves.
+/// A loop that has bent the graph to its liking has a small error and a large value here. Directions in which
+/// nothing but the edge itself holds its ends (eigenvalue 1 of P) say nothing about it and do not count.
+/// Empty if the edges of weight 1 do not hold the graph together.
+std::vector<double> LeaveOneOutChi2(const GraphProblem& problem, const std::vector<std::size_t>& edges);
 
 }  // namespace tutti::internal

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 namespace tutti::synthetic {
 

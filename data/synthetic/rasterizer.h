@@ -31,7 +31,7 @@ class Texture {
   };
   /// `lod`: log2 of texels per sample.
   Detail At(float lod) const;
-  /// For sanitizers (core/sanitized_range.h).
+  /// For sanitizers (core/inner_loops.h).
   void CheckReadable() const;
 
  private:

@@ -7,8 +7,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 
-#include "core/angle.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "frontend/features/features.h"
 #include "tutti/core/error.h"
 

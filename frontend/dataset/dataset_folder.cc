@@ -4,7 +4,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/text_input.h"
 #include "core/text_reader.h"
 #include "core/time_stamps.h"
 #include "tutti/core/error.h"

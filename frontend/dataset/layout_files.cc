@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <map>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "core/time_stamps.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/layout.h"

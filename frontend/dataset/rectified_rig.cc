@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 

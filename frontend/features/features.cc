@@ -5,7 +5,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/clones.h"
+#include "core/inner_loops.h"
 #include "core/intensity_centroid.h"
 #include "core/orb_description.h"
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "core/median.h"
-#include "core/sanitized_range.h"
-#include "core/small_ldlt.h"
+#include "core/eigen_bits.h"
+#include "core/inner_loops.h"
+#include "core/numbers.h"
 #include "frontend/features/features.h"
 #include "frontend/features/grey_window.h"
 

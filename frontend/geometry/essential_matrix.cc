@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/dense_solvers.h"
-#include "core/householder.h"
+#include "core/eigen_bits.h"
 #include "frontend/geometry/two_view.h"
 
 namespace tutti::internal {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/dense_solvers.h"
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

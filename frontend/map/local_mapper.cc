@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "core/stage_times.h"
+#include "core/stopwatch.h"
 #include "frontend/geometry/pose_solver.h"
 #include "frontend/geometry/two_view.h"
 #include "frontend/map/fuse.h"

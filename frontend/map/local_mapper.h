@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/stage_times.h"
+#include "core/stopwatch.h"
 #include "frontend/map/bundle_adjustment.h"
 #include "frontend/map/self_calibration.h"
 #include "tutti/frontend/frame.h"

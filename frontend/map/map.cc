@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/median.h"
+#include "core/numbers.h"
 #include "frontend/features/features.h"
 #include "frontend/map/patch_aligner.h"
 

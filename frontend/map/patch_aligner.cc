@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/eigen_bits.h"
 #include "core/reprojection.h"
-#include "core/small_ldlt.h"
 #include "frontend/features/grey_window.h"
 #include "frontend/geometry/lens_error.h"
 #include "frontend/geometry/pose_solver.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/stage_times.h"
+#include "core/stopwatch.h"
 #include "frontend/map/local_mapper.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/map.h"

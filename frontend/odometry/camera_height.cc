@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/median.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

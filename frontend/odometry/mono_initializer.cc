@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "core/angle.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "frontend/map/bundle_adjustment.h"
 #include "frontend/map/matcher.h"
 

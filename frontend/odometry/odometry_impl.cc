@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "core/dense_solvers.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "frontend/map/append.h"
 #include "frontend/map/fuse.h"
 #include "frontend/map/global_adjustment.h"

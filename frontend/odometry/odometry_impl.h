@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/section_file.h"
-#include "core/stage_times.h"
+#include "core/stopwatch.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/camera_height.h"
 #include "frontend/odometry/localizer.h"

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/section_file.h"
-#include "core/sections.h"
 #include "core/state_archive.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/odometry/odometry_file.h"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "frontend/geometry/pose_solver.h"
 #include "frontend/map/measured.h"
 #include "frontend/map/patch_aligner.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/stopwatch.h"
 #include "loopclosure/detector/detector_file.h"
 #include "loopclosure/detector/detector_state.h"

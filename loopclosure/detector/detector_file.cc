@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/parallel.h"
 #include "core/state_archive.h"
 #include "tutti/core/error.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/detector/ensemble.h"
 #include "loopclosure/detector/place_reasoner.h"
 #include "loopclosure/geometry/verification.h"

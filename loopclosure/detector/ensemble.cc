@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/parallel.h"
 #include "loopclosure/features/whole_image.h"
 #include "loopclosure/geometry/verification.h"

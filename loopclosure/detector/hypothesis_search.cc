@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/filter/transition_model.h"
 
 namespace tutti::internal {

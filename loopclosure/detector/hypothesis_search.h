@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/geometry/verification.h"
 #include "loopclosure/memory/belief.h"
 #include "loopclosure/memory/location_memory.h"

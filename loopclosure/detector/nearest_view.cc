@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/dense_solvers.h"
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 namespace {

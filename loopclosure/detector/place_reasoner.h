@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/detector/hypothesis_search.h"
 #include "loopclosure/detector/second_word.h"
 #include "loopclosure/filter/combination.h"

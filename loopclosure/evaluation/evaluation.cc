@@ -5,7 +5,7 @@
 #include <functional>
 #include <tuple>
 
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

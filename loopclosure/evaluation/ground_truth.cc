@@ -6,8 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "core/angle.h"
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"

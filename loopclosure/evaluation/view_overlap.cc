@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

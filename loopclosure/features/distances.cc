@@ -2,8 +2,7 @@
 
 #include <limits>
 
-#include "core/clones.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 namespace tutti::internal {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
 
 namespace tutti::internal {
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/features/scratch_pool.h"
 #include "loopclosure/features/surf_hessian.h"
 #include "loopclosure/store/packed_mat.h"

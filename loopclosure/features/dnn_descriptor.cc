@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"

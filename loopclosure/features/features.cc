@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/features/orb.h"
 #include "loopclosure/features/sift.h"
 #include "loopclosure/features/smoothing.h"

@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "core/fast_corners.h"
-#include "core/index.h"
 #include "core/intensity_centroid.h"
+#include "core/numbers.h"
 #include "core/orb_description.h"
 
 namespace tutti::internal {

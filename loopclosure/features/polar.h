@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <opencv2/core/hal/intrin.hpp>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 

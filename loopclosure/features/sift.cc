@@ -7,9 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "core/clones.h"
-#include "core/index.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
+#include "core/numbers.h"
 #include "loopclosure/features/smoothing.h"
 
 namespace tutti::internal {

@@ -1,4 +1,4 @@
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/features/sift.h"
 
 #include <algorithm>

@@ -11,9 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/clones.h"
-#include "core/index.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 namespace {

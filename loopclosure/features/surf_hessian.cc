@@ -4,9 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/clones.h"
-#include "core/index.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 namespace {

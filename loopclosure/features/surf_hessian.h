@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 

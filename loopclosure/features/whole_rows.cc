@@ -4,9 +4,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/clones.h"
-#include "core/index.h"
-#include "core/sanitized_range.h"
+#include "core/inner_loops.h"
+#include "core/numbers.h"
 #include "loopclosure/features/distances.h"
 
 #if defined(__x86_64__) && defined(__GNUC__)

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <numeric>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 
 namespace tutti {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/filter/pose_track.h"
 
 namespace tutti::internal {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 
 namespace tutti {

@@ -4,7 +4,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/dense_solvers.h"
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 namespace {

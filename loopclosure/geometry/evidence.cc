@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/dense_solvers.h"
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti::internal {
 namespace {

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/parallel.h"
 #include "loopclosure/geometry/matching.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/features/whole_rows.h"
 

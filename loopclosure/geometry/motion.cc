@@ -4,7 +4,7 @@
 #include <iterator>
 #include <numeric>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/geometry/epipolar.h"
 
 namespace tutti::internal {

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "core/index.h"
 #include "core/least_squares.h"
+#include "core/numbers.h"
 #include "core/reprojection.h"
 #include "core/umeyama.h"
 #include "tutti/loopclosure/relative_pose.h"

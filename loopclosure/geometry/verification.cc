@@ -6,7 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/geometry/evidence.h"
 #include "loopclosure/geometry/matching.h"
 #include "loopclosure/geometry/motion.h"

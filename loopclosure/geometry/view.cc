@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 #include "loopclosure/geometry/verification.h"
 

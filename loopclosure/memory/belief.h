@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti {
 

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/index.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 #include "tutti/core/error.h"
 

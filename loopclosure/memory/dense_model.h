@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 
 namespace tutti {
 

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 #include "loopclosure/memory/dense_model.h"
 

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/memory/belief.h"
 #include "loopclosure/vocabulary/signature.h"
 #include "loopclosure/vocabulary/word_map.h"

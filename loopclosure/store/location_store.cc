@@ -6,7 +6,7 @@
 #include <system_error>
 
 #include "core/byte_stream.h"
-#include "core/index.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

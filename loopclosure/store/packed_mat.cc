@@ -6,7 +6,7 @@
 #include <cstring>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 
 namespace tutti::internal {

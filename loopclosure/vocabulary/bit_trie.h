@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/shuffle.h"
 #include "loopclosure/vocabulary/word_storage.h"
 

@@ -5,8 +5,8 @@
 #include <numeric>
 #include <random>
 
-#include "core/clones.h"
-#include "core/index.h"
+#include "core/inner_loops.h"
+#include "core/numbers.h"
 #include "core/shuffle.h"
 #include "core/state_archive.h"
 #include "loopclosure/features/distances.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/shuffle.h"
 #include "core/state_archive.h"
 #include "loopclosure/vocabulary/descriptor_index.h"

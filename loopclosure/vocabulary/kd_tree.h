@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/descriptor_index.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 
 namespace tutti {

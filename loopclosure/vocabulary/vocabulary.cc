@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/parallel.h"
 #include "core/state_archive.h"
 #include "loopclosure/features/whole_rows.h"

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "core/state_archive.h"
 
 namespace tutti::internal {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/index.h"
+#include "core/numbers.h"
 #include "loopclosure/store/packed_mat.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/word_map.h"

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <random>
 
-#include "core/small_ldlt.h"
+#include "core/eigen_bits.h"
 #include "tutti/core/pose.h"
 
 namespace tutti::internal {

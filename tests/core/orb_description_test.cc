@@ -62,7 +62,7 @@ TEST(OrbDescription, TheImageMayBeAPartOfALargerOne) {
   EXPECT_EQ(cv::norm(Described(part, corners), Described(part.clone(), corners), cv::NORM_HAMMING), 0);
 }
 
-// AVX2 and FMA, where the processor has them, or plain x86-64, where sums are fused by hand.
+// AVX2 and FMA, where the processor has them, or plain x86-64, where the C library fuses.
 TEST(OrbDescription, InstructionsThatOpenCvMayUseChangeNoBit) {
   const cv::Mat image = Texture(5, {3000, 2000});
   const std::vector<cv::KeyPoint> corners = Corners(image.size());

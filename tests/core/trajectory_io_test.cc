@@ -19,7 +19,7 @@ std::filesystem::path Write(const std::string& text) { return testing::FreshFile
 
 std::string TextOf(const std::filesystem::path& file) { return internal::ReadText(file, "", 1 << 20); }
 
-std::string ErrorOf(const std::string& text, TrajectoryFormat format) {
+std::string ReadingError(const std::string& text, TrajectoryFormat format) {
   return testing::ErrorOf([&] { ReadTrajectory(Write(text), format); });
 }
 
@@ -65,27 +65,28 @@ TEST(TrajectoryIo, AcceptsCommentsEmptyLinesAndWindowsLineEnds) {
 TEST(TrajectoryIo, DamagedTumFilesNameTheLine) {
   const std::string good = "1 0 0 0 0 0 0 1\n";
   const auto tum = TrajectoryFormat::kTum;
-  EXPECT_THAT(ErrorOf(good + "2 0 0 0 0 0 1\n", tum), HasSubstr("poses.txt:2: has 7 columns"));
-  EXPECT_THAT(ErrorOf(good + "2 0 nan 0 0 0 0 1\n", tum), HasSubstr("poses.txt:2: 'nan' is not finite"));
-  EXPECT_THAT(ErrorOf(good + "2 0 inf 0 0 0 0 1\n", tum), HasSubstr(":2: 'inf' is not finite"));
-  EXPECT_THAT(ErrorOf(good + "2 0 x 0 0 0 0 1\n", tum), HasSubstr(":2: 'x' is not a number"));
-  EXPECT_THAT(ErrorOf(good + "2 0 0 0 0 0 0 0\n", tum), HasSubstr(":2: the quaternion is zero"));
-  EXPECT_THAT(ErrorOf("1e90 0 0 0 0 1e90 0 0 0 0 1e90 0\n", TrajectoryFormat::kKitti),
+  EXPECT_THAT(ReadingError(good + "2 0 0 0 0 0 1\n", tum), HasSubstr("poses.txt:2: has 7 columns"));
+  EXPECT_THAT(ReadingError(good + "2 0 nan 0 0 0 0 1\n", tum), HasSubstr("poses.txt:2: 'nan' is not finite"));
+  EXPECT_THAT(ReadingError(good + "2 0 inf 0 0 0 0 1\n", tum), HasSubstr(":2: 'inf' is not finite"));
+  EXPECT_THAT(ReadingError(good + "2 0 x 0 0 0 0 1\n", tum), HasSubstr(":2: 'x' is not a number"));
+  EXPECT_THAT(ReadingError(good + "2 0 0 0 0 0 0 0\n", tum), HasSubstr(":2: the quaternion is zero"));
+  EXPECT_THAT(ReadingError("1e90 0 0 0 0 1e90 0 0 0 0 1e90 0\n", TrajectoryFormat::kKitti),
               HasSubstr("not a rotation matrix"));
-  EXPECT_THAT(ErrorOf(good + "2 0 0 0 1e90 0 0 0\n", tum),
+  EXPECT_THAT(ReadingError(good + "2 0 0 0 1e90 0 0 0\n", tum),
               HasSubstr(":2: the quaternion is far from length 1"));
-  EXPECT_THAT(ErrorOf(good + good, tum), HasSubstr(":2: repeats the time stamp"));
-  EXPECT_THAT(ErrorOf("2 0 0 0 0 0 0 1\n" + good, tum), HasSubstr(":2: goes back in time"));
-  EXPECT_THAT(ErrorOf("", tum), HasSubstr("holds no pose"));
-  EXPECT_THAT(ErrorOf("# only a comment\n", tum), HasSubstr("holds no pose"));
+  EXPECT_THAT(ReadingError(good + good, tum), HasSubstr(":2: repeats the time stamp"));
+  EXPECT_THAT(ReadingError("2 0 0 0 0 0 0 1\n" + good, tum), HasSubstr(":2: goes back in time"));
+  EXPECT_THAT(ReadingError("", tum), HasSubstr("holds no pose"));
+  EXPECT_THAT(ReadingError("# only a comment\n", tum), HasSubstr("holds no pose"));
 }
 
 TEST(TrajectoryIo, DamagedKittiAndEurocFilesNameTheLine) {
-  EXPECT_THAT(ErrorOf("1 0 0 0 0 1 0 0 0 0 1\n", TrajectoryFormat::kKitti), HasSubstr(":1: has 11 columns"));
-  EXPECT_THAT(ErrorOf("9 0 0 0 0 1 0 0 0 0 1 0\n", TrajectoryFormat::kKitti),
+  EXPECT_THAT(ReadingError("1 0 0 0 0 1 0 0 0 0 1\n", TrajectoryFormat::kKitti),
+              HasSubstr(":1: has 11 columns"));
+  EXPECT_THAT(ReadingError("9 0 0 0 0 1 0 0 0 0 1 0\n", TrajectoryFormat::kKitti),
               HasSubstr(":1: its 3x3 part is not a rotation"));
-  EXPECT_THAT(ErrorOf("1000,0,0,0,1,0,0\n", TrajectoryFormat::kEuroc), HasSubstr(":1: has 7 columns"));
-  EXPECT_THAT(ErrorOf("2000,0,0,0,1,0,0,0\n1000,0,0,0,1,0,0,0\n", TrajectoryFormat::kEuroc),
+  EXPECT_THAT(ReadingError("1000,0,0,0,1,0,0\n", TrajectoryFormat::kEuroc), HasSubstr(":1: has 7 columns"));
+  EXPECT_THAT(ReadingError("2000,0,0,0,1,0,0,0\n1000,0,0,0,1,0,0,0\n", TrajectoryFormat::kEuroc),
               HasSubstr(":2: goes back in time"));
 }
 
@@ -107,7 +108,8 @@ TEST(TrajectoryIo, TwoMoreColumnsAreStandardDeviations) {
   ASSERT_EQ(sigmas.size(), 2u);
   EXPECT_DOUBLE_EQ(sigmas[1].translation_m, 0.5);
   EXPECT_NEAR(sigmas[1].rotation_rad, M_PI / 2, 1e-12);
-  EXPECT_THAT(ErrorOf(two, TrajectoryFormat::kTum), HasSubstr(":1: has 10 columns; the TUM format has 8"));
+  EXPECT_THAT(ReadingError(two, TrajectoryFormat::kTum),
+              HasSubstr(":1: has 10 columns; the TUM format has 8"));
   const auto refused = [&](const std::string& text) {
     return testing::ErrorOf([&] { ReadTrajectory(Write(text), TrajectoryFormat::kTum, nullptr, &details); });
   };
@@ -198,9 +200,9 @@ TEST(TrajectoryIo, ALineThatNamesTheColumnsDecidesWhichIsWhich) {
                              std::to_string(1403636579750 + 250LL * k), "9", "9", "9", x, "0.5", "-1", "3"};
                        }),
                  false);
-  EXPECT_THAT(ErrorOf("foo bar\n1 2\n", TrajectoryFormat::kTum),
+  EXPECT_THAT(ReadingError("foo bar\n1 2\n", TrajectoryFormat::kTum),
               HasSubstr(":1: 'foo' is not a number; a first line that names columns"));
-  EXPECT_THAT(ErrorOf("t x y z qx qy qz qw\n1 0 0 0 1\n", TrajectoryFormat::kTum),
+  EXPECT_THAT(ReadingError("t x y z qx qy qz qw\n1 0 0 0 1\n", TrajectoryFormat::kTum),
               HasSubstr(":2: has 5 columns, but the line above names 8"));
 }
 
@@ -256,7 +258,7 @@ TEST(TrajectoryIo, PositionsAloneHaveNoRotation) {
     EXPECT_THAT(testing::ErrorOf([&] { WriteTrajectory(file, read, TrajectoryFormat::kKitti); }),
                 HasSubstr("needs rotations"));
   }
-  EXPECT_THAT(ErrorOf("1 2 3 4 0 0 0 0\n2 3 4 5 0 0 0 1\n", TrajectoryFormat::kTum),
+  EXPECT_THAT(ReadingError("1 2 3 4 0 0 0 0\n2 3 4 5 0 0 0 1\n", TrajectoryFormat::kTum),
               HasSubstr(":1: the quaternion is zero"));
 }
 
@@ -278,7 +280,7 @@ TEST(TrajectoryIo, KittiLinesMayHaveANumberAndAFourthRow) {
       ReadTrajectory(Write("1403636579.5 " + row + "\n"), TrajectoryFormat::kKitti, nullptr, &details);
   EXPECT_TRUE(details.has_stamps);
   EXPECT_EQ(timed[0].stamp_s, 1403636579.5);
-  EXPECT_THAT(ErrorOf(row + " 0 0 1 1\n", TrajectoryFormat::kKitti), HasSubstr("is not 0 0 0 1"));
+  EXPECT_THAT(ReadingError(row + " 0 0 1 1\n", TrajectoryFormat::kKitti), HasSubstr("is not 0 0 0 1"));
 }
 
 TEST(TrajectoryIo, StampsThatLostTheirDigitsAreSaid) {

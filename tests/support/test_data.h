@@ -15,6 +15,9 @@ std::filesystem::path RealData(const std::string& name);
 std::filesystem::path SourceDir();
 std::filesystem::path FreshFolder();
 
+/// What a file holds.
+std::string BytesOf(const std::filesystem::path& file);
+
 /// A file with this content in such a folder.
 std::filesystem::path FreshFile(const std::string& name, const std::string& content);
 

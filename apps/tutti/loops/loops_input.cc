@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "apps/tutti/loops/overlap_truth.h"
-#include "core/median.h"
-#include "core/number_lines.h"
+#include "core/numbers.h"
 #include "core/pose_columns.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "apps/slam/map_parts.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"

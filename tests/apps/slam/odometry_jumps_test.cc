@@ -7,7 +7,7 @@
 #include <string>
 
 #include "apps/slam/trajectory_correction.h"
-#include "core/angle.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {

@@ -1,10 +1,10 @@
-// Downsampling, motion filter, projection, point distances, radians: known answers, with evo's definitions.
+// Downsampling, motion filter, projection, point distances: known answers, with evo's definitions.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tests/support/error_of.h"
 #include "tutti/backend/evaluation.h"
 
@@ -126,32 +126,6 @@ TEST(EvaluationFilter, PointDistanceSeesLengthsAlone) {
   for (StampedPose& pose : reference) pose.pose.translation.setZero();
   const EvaluationReport still = EvaluateTrajectory(reference, estimate, options);
   EXPECT_EQ(still.rpe_point_distance_ratio.count, 0u) << "nothing is divided by nothing";
-}
-
-TEST(EvaluationFilter, RadiansAreDegreesOfAnotherSize) {
-  Trajectory turning = Line(100);
-  for (std::size_t k = 0; k < 100; ++k)
-    turning[k].pose.rotation = ExpSO3({0, 0, 0.1 * static_cast<double>(k)});
-  std::vector<Pose> poses;
-  std::vector<double> stamps;
-  for (const StampedPose& pose : turning) {
-    poses.push_back(pose.pose);
-    stamps.push_back(pose.stamp_s);
-  }
-  for (const bool all_pairs : {false, true}) {
-    EvaluationOptions radians, degrees;
-    radians.rpe_all_pairs = degrees.rpe_all_pairs = all_pairs;
-    radians.rpe_unit = DeltaUnit::kRadians;
-    radians.rpe_delta = 0.45;
-    degrees.rpe_unit = DeltaUnit::kDegrees;
-    degrees.rpe_delta = 0.45 * internal::kDegrees;
-    const auto pairs = RelativePairs(poses, stamps, radians);
-    EXPECT_EQ(pairs, RelativePairs(poses, stamps, degrees));
-    ASSERT_FALSE(pairs.empty());
-    if (!all_pairs) {
-      EXPECT_EQ(pairs[0], (std::pair<std::size_t, std::size_t>(0, 5)));
-    }
-  }
 }
 
 TEST(EvaluationFilter, StatisticsOfTheAssociation) {

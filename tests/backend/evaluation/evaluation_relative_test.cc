@@ -142,6 +142,7 @@ TEST(EvaluateDrift, IsOfTheTenthsOfThePathUpToItsHalf) {
   const SegmentErrors drift = EvaluateDrift(reference, estimate);
   EXPECT_EQ(drift.segments, segments);
   EXPECT_NEAR(drift.translation_percent, percent / static_cast<double>(segments), 1e-9);
+  EXPECT_EQ(EvaluateDrift({reference[0]}, {estimate[0]}).segments, 0u);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "tests/backend/graph/synthetic_graph.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace tutti::testing {
@@ -118,6 +119,35 @@ double PositionError(const PoseGraph& graph, const std::vector<Similarity>& trut
     sum += (node.pose.translation - truth[static_cast<std::size_t>(node.id)].translation).squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(graph.nodes().size()));
+}
+
+std::vector<Similarity> PosesOf(const PoseGraph& graph) {
+  std::vector<Similarity> poses;
+  for (const PoseGraphNode& node : graph.nodes()) poses.push_back(node.pose);
+  return poses;
+}
+
+PoseGraph WithoutPoses(const PoseGraph& graph) {
+  PoseGraph out(graph.kind());
+  for (PoseGraphNode node : graph.nodes()) {
+    node.has_estimate = false;
+    out.AddNode(node);
+  }
+  for (const PoseGraphEdge& edge : graph.edges()) out.AddEdge(edge);
+  return out;
+}
+
+std::string TestName(std::string name) {
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+ProblemAtPoses::ProblemAtPoses(PoseGraph of, const PoseGraphOptions& with)
+    : graph(std::move(of)),
+      options(with),
+      structure(internal::AnalyseGraph(graph)),
+      problem(internal::MakeGraphProblem(graph, structure, options)) {
+  problem->SetPoses(PosesOf(graph));
 }
 
 Eigen::MatrixXd DenseInverse(const Eigen::MatrixXd& matrix) { return matrix.inverse(); }

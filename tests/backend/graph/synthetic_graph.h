@@ -1,9 +1,12 @@
 // Pose graphs with a known answer.
 #pragma once
 
+#include <memory>
 #include <random>
+#include <string>
 #include <vector>
 
+#include "backend/solver/graph_problem.h"
 #include "tutti/backend/pose_graph.h"
 
 namespace tutti::testing {
@@ -37,6 +40,25 @@ SyntheticGraph MakeSyntheticGraph(const SyntheticGraphOptions& options);
 
 /// Root mean square distance of the nodes from the truth [m].
 double PositionError(const PoseGraph& graph, const std::vector<Similarity>& truth);
+
+/// S_world_node in the order of the nodes.
+std::vector<Similarity> PosesOf(const PoseGraph& graph);
+
+/// The graph without estimates of its nodes.
+PoseGraph WithoutPoses(const PoseGraph& graph);
+
+/// "parking-garage" as the name of a test.
+std::string TestName(std::string name);
+
+/// A graph as the problem that solvers see, at its poses.
+struct ProblemAtPoses {
+  explicit ProblemAtPoses(PoseGraph of, const PoseGraphOptions& with = {});
+
+  const PoseGraph graph;
+  const PoseGraphOptions options;
+  const internal::GraphStructure structure;
+  const std::unique_ptr<internal::GraphProblem> problem;
+};
 
 /// Standard normal, with the same numbers on every platform.
 double Gauss(std::mt19937& random);

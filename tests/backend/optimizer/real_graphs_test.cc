@@ -36,11 +36,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Reference{"intel", 45.004696}, Reference{"manhattanOlson3500", 146.07661},
                       Reference{"kitti_00", 98.322012}, Reference{"manhattan", 3549.0368},
                       Reference{"torus3D", 14574.746}),
-    [](const auto& test) {
-      std::string name;
-      for (char c : std::string(test.param.name)) name += c == '-' ? '_' : c;
-      return name;
-    });
+    [](const auto& test) { return testing::TestName(test.param.name); });
 
 TEST(RealGraphs, AutoPicksTheChordalStartWhereOdometryIsFarOff) {
   TUTTI_REQUIRE_DATA(file, "posegraphs/manhattan.g2o");

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "backend/graph/edge_weights.h"
+#include "backend/solver/chordal_descent.h"
 #include "tests/backend/graph/synthetic_graph.h"
 
 namespace tutti {

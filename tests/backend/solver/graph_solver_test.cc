@@ -109,17 +109,13 @@ TEST(GraphSolvers, AgreeOnAPartThatOnlyRefusedLoopsTie) {
   graph.AddLoop(0, 3, Similarity(1, Eigen::Quaterniond::Identity(), {3, 0, 0}), sure);
   graph.AddLoop(1, 5, Similarity(1, Eigen::Quaterniond::Identity(), {50, 0, 0}), sure);
   graph.AddLoop(1, 5, Similarity(1, Eigen::Quaterniond::Identity(), {-50, 0, 0}), sure);
-  const internal::GraphStructure structure = internal::AnalyseGraph(graph);
   for (PoseGraphSolver solver : {PoseGraphSolver::kCeres, PoseGraphSolver::kBlock}) {
     PoseGraphOptions options = Precise();
     options.solver = solver;
-    internal::GraphProblem<6> problem(graph, structure, options);
-    std::vector<Similarity> poses;
-    for (const PoseGraphNode& node : graph.nodes()) poses.push_back(node.pose);
-    problem.SetPoses(poses);
-    for (const std::size_t refused : {7u, 8u}) problem.SetWeight(refused, 0);
-    EXPECT_TRUE(problem.Solve(options.max_iterations, 0).usable) << ToString(solver);
-    poses = problem.Poses();
+    const testing::ProblemAtPoses made(graph, options);
+    for (const std::size_t refused : {7u, 8u}) made.problem->SetWeight(refused, 0);
+    EXPECT_TRUE(made.problem->Solve(options.max_iterations, 0).usable) << ToString(solver);
+    const std::vector<Similarity> poses = made.problem->Poses();
     EXPECT_NEAR(poses[3].translation.x(), 3, 1e-6) << ToString(solver);
     EXPECT_NEAR((poses[7].translation - poses[4].translation).norm(), 3, 1e-4) << ToString(solver);
   }
@@ -165,11 +161,7 @@ TEST_P(BothSolvers, ReachTheSameOptimumOfAPublishedGraph) {
 INSTANTIATE_TEST_SUITE_P(Published, BothSolvers,
                          ::testing::Values("sphere2500", "parking-garage", "intel", "manhattanOlson3500",
                                            "kitti_00", "manhattan", "torus3D"),
-                         [](const auto& test) {
-                           std::string name;
-                           for (char c : std::string(test.param)) name += c == '-' ? '_' : c;
-                           return name;
-                         });
+                         [](const auto& test) { return testing::TestName(test.param); });
 
 }  // namespace
 }  // namespace tutti

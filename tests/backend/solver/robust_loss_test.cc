@@ -20,16 +20,12 @@ TEST(RobustLoss, WeightIsTheDerivativeOfTheCost) {
   }
 }
 
-TEST(RobustLoss, DcsIsBoundedAndSmoothAtItsThreshold) {
+TEST(RobustLoss, DcsIsBoundedAndSmoothAtItsThresholdAndGncTruncates) {
+  EXPECT_EQ(RobustCost(RobustLoss::kGnc, 3.0, 4.0), 3.0);
+  EXPECT_EQ(RobustCost(RobustLoss::kGnc, 300.0, 4.0), 4.0);
   EXPECT_NEAR(RobustCost(RobustLoss::kDcs, 4.0 + 1e-9, 4.0), 4.0, 1e-8);
   EXPECT_NEAR(RobustWeight(RobustLoss::kDcs, 4.0 + 1e-9, 4.0), 1.0, 1e-8);
   EXPECT_LT(RobustCost(RobustLoss::kDcs, 1e12, 4.0), 12.0);
-  double rho[3];
-  internal::DcsLoss(4.0).Evaluate(10.0, rho);
-  const double h = 1e-4;
-  const double numeric =
-      (RobustWeight(RobustLoss::kDcs, 10 + h, 4.0) - RobustWeight(RobustLoss::kDcs, 10 - h, 4.0)) / (2 * h);
-  EXPECT_NEAR(rho[2], numeric, 1e-7);
 }
 
 TEST(RobustLoss, DerivativesThatCeresGetsAreThoseOfTheCost) {
@@ -37,7 +33,7 @@ TEST(RobustLoss, DerivativesThatCeresGetsAreThoseOfTheCost) {
   const internal::GemanMcClureLoss geman_mcclure(4.0);
   for (const ceres::LossFunction* loss : {static_cast<const ceres::LossFunction*>(&dcs),
                                           static_cast<const ceres::LossFunction*>(&geman_mcclure)}) {
-    for (double s : {0.5, 3.0, 6.0, 50.0}) {
+    for (double s : {0.5, 3.0, 6.0, 10.0, 50.0}) {
       constexpr double kStep = 1e-5;
       double here[3], before[3], after[3];
       loss->Evaluate(s, here);
@@ -69,11 +65,6 @@ TEST(ChiSquare, QuantilesHaveTheirProbabilities) {
     EXPECT_NEAR(ChiSquareProbability(n, internal::ChiSquare99(n)), 0.99, 1e-6) << n;
     EXPECT_NEAR(ChiSquareProbability(n, internal::ChiSquareMedian(n)), 0.5, 1e-6) << n;
   }
-}
-
-TEST(RobustLoss, GncTruncates) {
-  EXPECT_EQ(RobustCost(RobustLoss::kGnc, 3.0, 4.0), 3.0);
-  EXPECT_EQ(RobustCost(RobustLoss::kGnc, 300.0, 4.0), 4.0);
 }
 
 }  // namespace

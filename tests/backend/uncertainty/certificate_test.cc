@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/backend/graph/synthetic_graph.h"
 #include "tests/support/test_data.h"
 #include "tutti/backend/g2o_io.h"
@@ -128,11 +126,7 @@ INSTANTIATE_TEST_SUITE_P(Published, CertificateOfPublishedGraph,
                                            Published{"torus3D", 24227.046},
                                            Published{"parking-garage", 1.262526},
                                            Published{"kitti_00", 125.69351}),
-                         [](const auto& test) {
-                           std::string name = test.param.name;
-                           name.erase(std::remove(name.begin(), name.end(), '-'), name.end());
-                           return name;
-                         });
+                         [](const auto& test) { return testing::TestName(test.param.name); });
 
 }  // namespace
 }  // namespace tutti

@@ -68,20 +68,6 @@ TEST(GraphCovariance, DistanceIsWhatALoopAddsToTheCost) {
   EXPECT_NEAR(distance, after - before, 0.1 * distance + 0.05);
 }
 
-TEST(GraphCovariance, TellsTrueLoopsFromFalseOnes) {
-  SyntheticGraphOptions options;
-  options.noise_translation = 0.02;
-  options.noise_rotation = 0.005;
-  options.loops = 0;
-  const SyntheticGraph synthetic = MakeSyntheticGraph(options);
-  const GraphCovariance covariance(synthetic.graph);
-  PoseGraphEdge loop{10, 70, synthetic.truth[10].Inverse() * synthetic.truth[70], MakeInformation(0.02, 0.01),
-                     EdgeKind::kLoop};
-  EXPECT_LT(covariance.SquaredDistance(loop), 16.8);
-  loop.to = 95;  // another place that looks the same
-  EXPECT_GT(covariance.SquaredDistance(loop), 1000);
-}
-
 TEST(GraphCovariance, SaysWhatItCanNotKnow) {
   PoseGraph graph;
   for (int id = 0; id < 4; ++id) graph.AddNode(id, Pose());

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/angle.h"
-#include "core/median.h"
+#include "core/numbers.h"
 #include "tests/support/recording.h"
 #include "tests/support/small_town.h"
 #include "tutti/frontend/odometry.h"

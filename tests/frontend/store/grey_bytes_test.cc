@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/section_packer.h"
+#include "core/section_file.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 

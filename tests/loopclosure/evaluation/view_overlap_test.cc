@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/angle.h"
+#include "core/numbers.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

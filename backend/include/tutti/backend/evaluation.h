@@ -147,7 +147,7 @@ PoseErrors AbsoluteErrors(const std::vector<PoseMatrix>& reference, const std::v
 std::vector<double> PointDistanceErrors(const std::vector<PoseMatrix>& reference,
                                         const std::vector<PoseMatrix>& estimate,
                                         const std::vector<std::pair<std::size_t, std::size_t>>& pairs);
-/// The same over |R_i - R_j| [%]; pairs whose reference does not move are left out.
+/// PointDistanceErrors over |R_i - R_j| [%]; pairs whose reference does not move are left out.
 std::vector<double> PointDistanceRatios(const std::vector<PoseMatrix>& reference,
                                         const std::vector<PoseMatrix>& estimate,
                                         const std::vector<std::pair<std::size_t, std::size_t>>& pairs);

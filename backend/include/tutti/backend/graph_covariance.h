@@ -27,8 +27,8 @@ class GraphCovariance {
   /// by (t + dt, R Exp(dr), log s + dls), translation in the world [m^2, m rad, rad^2]; zero for anchors.
   /// Throws InputError for an unknown id.
   Eigen::MatrixXd OfPose(int id) const;
-  /// Of S_from_to as the graph has it, as a perturbation in the frame of `to`. Throws InputError for an
-  /// unknown id, or if no edges connect the two.
+  /// Covariance of S_from_to as the graph has it, as a perturbation in the frame of `to`. Throws InputError
+  /// for an unknown id, or if no edges connect the two.
   Eigen::MatrixXd OfRelativePose(int from, int to) const;
   /// Squared Mahalanobis distance [1] of a measurement that is not in the graph yet. Same errors.
   double SquaredDistance(const PoseGraphEdge& measurement) const;

@@ -117,7 +117,7 @@ class KeyframeGraph {
   /// Optimises it. The map's poses stay, so that the call can be repeated with other loops.
   KeyframeCorrection Optimize(const std::vector<LoopEdge>& loops) const;
 
-  /// The same from each start (the map, the odometry along a spanning tree, chordal), and a certificate of
+  /// Optimises from each start (the map, the odometry along a spanning tree, chordal), and a certificate of
   /// the best solution, as far as there is one for graphs of this kind. Huber's loss and the like count in
   /// what is the best, the certificate knows least squares alone.
   KeyframeGraphProof Prove(const std::vector<LoopEdge>& loops) const;
@@ -132,14 +132,16 @@ class KeyframeGraph {
   /// over the edge between the two: uncertainties add up, and what was connected stays so. To be called after
   /// Update with all of them, and before Update without.
   void Remove(const std::map<int, int>& into);
-  /// The same for a loop, to be called before Remove. False if both of its ends become one keyframe.
+  /// Leads a loop to the keyframes that stand for its ends; to be called before Remove. False if both of its
+  /// ends become one keyframe.
   bool Rehang(const std::map<int, int>& into, LoopEdge* loop) const;
 
   /// To be called after Update and before the map takes these poses: keeps the measurements, in the new
   /// units.
   void Move(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges);
 
-  /// Of odometry edges, from now on (KeyframeGraphOptions). Throws InputError if they are not usable.
+  /// Standard deviations of odometry edges, from now on (KeyframeGraphOptions). Throws InputError if they are
+  /// not usable.
   void SetSigmas(double translation_ratio, double rotation_rad);
   /// How uncertain the odometry's motion to this keyframe is, since the one that was noted before it;
   /// ascending by id. An edge is at least as uncertain as all such motions between its ends. Not part of
@@ -197,7 +199,7 @@ class KeyframeGraph {
   bool Follows(int older, int newer) const;
   void TieBeginnings();
   std::vector<CovisiblePair> Strongest(const std::vector<CovisiblePair>& covisible) const;
-  const Edge* Kept(int older, int newer) const;
+  static const Edge* FindEdge(const std::vector<Edge>& edges, int older, int newer);  // ascending
   Similarity Measured(int older, int newer) const;
   std::map<int, int> Merges(const std::vector<LoopEdge>& loops) const;
   std::map<int, Similarity> JoinedPieces(const std::vector<LoopEdge>& loops) const;

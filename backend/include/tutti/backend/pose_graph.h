@@ -23,8 +23,8 @@ const char* ToString(GraphKind kind);
 /// kOdometry edges are trusted; robust losses act on kLoop edges only.
 enum class EdgeKind { kOdometry, kLoop };
 
-/// Of a node or a landmark. Ids of 2^63 and more, which g2o files may have, are negative here and keep their
-/// spelling (PoseGraph::NameOf).
+/// Id of a node or a landmark. Ids of 2^63 and more, which g2o files may have, are negative here and keep
+/// their spelling (PoseGraph::NameOf).
 using NodeId = std::int64_t;
 
 /// One pose of the graph.

@@ -1,8 +1,7 @@
-// Is one detector really better than another? Paired tests and intervals for loop-closure results
+// Is one detector really better than another? Paired tests for loop-closure results
 // (loop-closure.md section 7).
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #pragma GCC visibility push(default)
@@ -23,7 +22,7 @@ struct McNemarResult {
 /// are taken as 0.
 McNemarResult McNemarTest(int only_a, int only_b);
 
-/// The same from outcomes, one per image (true: found). Throws InputError if the lengths differ.
+/// McNemar's test from outcomes, one per image (true: found). Throws InputError if the lengths differ.
 McNemarResult McNemarTest(const std::vector<bool>& a, const std::vector<bool>& b);
 
 /// Pairs from which on a p-value is worth reporting: with fewer, one lucky run decides.
@@ -47,49 +46,6 @@ PairedTTestResult PairedTTest(const std::vector<double>& a, const std::vector<do
 /// function I_x(degrees / 2, 1 / 2) at x = degrees / (degrees + t^2) (Abramowitz and Stegun 26.7.1 and
 /// 26.5.27).
 double StudentTwoSided(double t, double degrees);
-
-/// Outcome of the sign test.
-struct SignTestResult {
-  int greater = 0;  ///< pairs with a > b
-  int less = 0;     ///< pairs with a < b
-  int ties = 0;     ///< pairs with a = b; they are left out
-  double p = 1;     ///< one-sided: P(X >= greater) for X ~ B(greater + less, 1/2); 1 without a difference
-};
-
-/// One-sided sign test that a is greater than b no more often than less (Dixon and Mood, Journal of the
-/// American Statistical Association 41, 1946): needs neither a distribution nor a scale that is the same for
-/// all pairs, as for figures of different worlds. Exact. Throws InputError if the lengths differ or a value
-/// is no number.
-SignTestResult SignTest(const std::vector<double>& a, const std::vector<double>& b);
-
-/// The same from counts; those below 0 are taken as 0.
-SignTestResult SignTest(int greater, int less);
-
-/// One group's part in a pooled ratio: of a world, its true positives out of all that was accepted.
-struct RatioPart {
-  double numerator = 0;    ///< such as TP
-  double denominator = 0;  ///< such as TP + FP, at least 0
-};
-
-/// Outcome of BootstrapRatio.
-struct BootstrapInterval {
-  double ratio = 0;   ///< sum of numerators / sum of denominators; NaN if that is 0
-  double low = 0;     ///< lower end; NaN if no resample has a ratio
-  double high = 0;    ///< upper end; NaN if no resample has a ratio
-  int resamples = 0;  ///< that had a ratio: the sum of their denominators is not 0
-};
-
-/// Percentile bootstrap interval (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 13)
-/// for a pooled ratio, sum of numerators / sum of denominators. Whole groups are drawn with replacement, as
-/// many as there are: images of one world are not independent of each other (cluster bootstrap, Davison and
-/// Hinkley, Bootstrap Methods, 1997, section 3.8). The ends are the (1 - confidence) / 2 and
-/// (1 + confidence) / 2 quantiles of the resampled ratios, interpolated between order statistics. Where all
-/// groups agree, both ends are the ratio itself: with few groups the interval is too short. Resamples whose
-/// denominators sum to 0 are left out. The same for a seed on every machine. Throws InputError for no
-/// groups, a value that is not finite, a denominator below 0, fewer than 1 resample, or a confidence outside
-/// of 0..1, both excluded.
-BootstrapInterval BootstrapRatio(const std::vector<RatioPart>& groups, double confidence = 0.95,
-                                 int resamples = 10000, std::uint64_t seed = 1);
 
 }  // namespace tutti
 #pragma GCC visibility pop

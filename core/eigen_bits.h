@@ -1,15 +1,34 @@
-// x of a x = b, `a` factored by Eigen's LDLT. Not installed.
-//
-// The bits are those of LDLT::solve() of a matrix of fixed size. Eigen writes that out for each size and kind
-// of right side, which costs a compiler a second per size; here the sizes share one set of sums.
+// Steps of decompositions with the bits of Eigen's templates, which cost a compiler seconds each. Not
+// installed.
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/Householder>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-namespace tutti::internal::small_ldlt {
+namespace tutti::internal {
+
+/// q = H_0 H_1 ... q, the first reflection from row `shift` on, one for each coefficient: their vectors stand
+/// below the diagonal of `packed`, further down by `shift`. The bits are those of Eigen's
+/// HouseholderSequence, whose template also makes the compiler work out the way for 48 reflections and more.
+template <class Packed, class Coefficients, class Matrix>
+void Reflect(const Packed& packed, const Coefficients& coefficients, Eigen::Index shift, Matrix* q) {
+  Eigen::Matrix<double, 1, Matrix::ColsAtCompileTime, Eigen::RowMajor, 1, Matrix::MaxColsAtCompileTime>
+      workspace(q->cols());
+  for (Eigen::Index k = coefficients.size(); k-- > 0;) {
+    const Eigen::Index rows = q->rows() - shift - k;
+    q->bottomRows(rows).applyHouseholderOnTheLeft(packed.col(k).tail(rows - 1), coefficients(k),
+                                                  workspace.data());
+  }
+}
+
+/// x of a x = b, `a` factored by Eigen's LDLT. The bits are those of LDLT::solve() of a matrix of fixed size.
+/// Eigen writes that out for each size and kind of right side, which costs a compiler a second per size; here
+/// the sizes share one set of sums.
+namespace small_ldlt {
 
 // In the order in which Eigen sums up `Length` products; those of `a` are `stride` apart.
 template <int Length, int Stride, class Scalar>
@@ -58,4 +77,5 @@ void SolveInPlace(const Eigen::LDLT<Matrix>& a, typename Matrix::Scalar* x) {
   for (Eigen::Index i = n; i-- > 0;) std::swap(x[i], x[swapped(i)]);
 }
 
-}  // namespace tutti::internal::small_ldlt
+}  // namespace small_ldlt
+}  // namespace tutti::internal

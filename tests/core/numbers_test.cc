@@ -1,4 +1,4 @@
-#include "core/median.h"
+#include "core/numbers.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,4 @@
-// Ceres on a pose graph. Private to the back end.
-#pragma once
-
+// Ceres on a pose graph.
 #include <ceres/ceres.h>
 
 #include <algorithm>
@@ -11,17 +9,17 @@
 #include <vector>
 
 #include "backend/graph/manifold.h"
-#include "backend/solver/graph_solver.h"
+#include "backend/solver/weighted_graph.h"
 
 namespace tutti::internal {
+namespace {
 
 /// Whitened error of one edge, times the square root of a weight that may change between solves.
 template <int N>
 class EdgeCost final : public ceres::SizedCostFunction<N, BlockSize<N>(), BlockSize<N>()> {
  public:
   /// Both outlive this object and stay where they are.
-  EdgeCost(const EdgeConstants<N>& constants, const double& weight)
-      : constants_(constants), weight_(weight) {}
+  EdgeCost(const EdgeError<N>& edge, const double& weight) : edge_(edge), weight_(weight) {}
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     using Lifted = Eigen::Matrix<double, N, BlockSize<N>(), Eigen::RowMajor>;
@@ -29,8 +27,8 @@ class EdgeCost final : public ceres::SizedCostFunction<N, BlockSize<N>(), BlockS
     Eigen::Matrix<double, N, N> J[2];
     const bool want[2] = {jacobians != nullptr && jacobians[0] != nullptr,
                           jacobians != nullptr && jacobians[1] != nullptr};
-    WhitenedError<N>(constants_, parameters[0], parameters[1], residual, want[0] ? &J[0] : nullptr,
-                     want[1] ? &J[1] : nullptr);
+    edge_.EvaluateWhitened(parameters[0], parameters[1], residual, want[0] ? &J[0] : nullptr,
+                           want[1] ? &J[1] : nullptr);
     const double root = std::sqrt(weight_);
     Eigen::Map<Eigen::Matrix<double, N, 1>>{residuals} = root * residual;
     for (int k = 0; k < 2; ++k) {
@@ -43,7 +41,7 @@ class EdgeCost final : public ceres::SizedCostFunction<N, BlockSize<N>(), BlockS
   }
 
  private:
-  const EdgeConstants<N>& constants_;
+  const EdgeError<N>& edge_;
   const double& weight_;
 };
 
@@ -73,7 +71,7 @@ class CeresSolver final : public GraphSolver<N> {
 
   SolveSummary Solve(WeightedGraph<N>& graph, const SolveLimits& limits) override {
     if (!problem_ || active_ != graph.Active()) Build(graph);
-    loss_.Reset(graph.loss.get(), ceres::DO_NOT_TAKE_OWNERSHIP);
+    loss_.Reset(graph.loss(), ceres::DO_NOT_TAKE_OWNERSHIP);
     ceres::Solver::Summary summary;
     ceres::Solver::Options options = Options(limits);
     StopCallback stop_callback(limits.stop);
@@ -124,23 +122,19 @@ class CeresSolver final : public GraphSolver<N> {
   void Build(WeightedGraph<N>& graph) {
     problem_.emplace(ProblemOptions());
     active_ = graph.Active();
-    if (costs_.empty()) AddCosts(graph);
-    const GraphStructure& structure = *graph.structure;
+    for (std::size_t e = costs_.size(); e < active_.size(); ++e)
+      costs_.emplace_back(graph.Edge(e), graph.weights()[e]);
+    const GraphStructure& structure = graph.structure();
     for (std::size_t k = 0; k < structure.constant.size(); ++k) {
       AddBlock(*problem_, graph.Block(k), BlockSize<N>(), manifold_.get());
       if (structure.constant[k]) problem_->SetParameterBlockConstant(graph.Block(k));
     }
-    graph.terms->AddTo(*problem_, graph.blocks.data());
+    graph.terms().AddTo(*problem_, graph.blocks());
     for (std::size_t e = 0; e < active_.size(); ++e) {
       if (!active_[e]) continue;
       double *from = graph.Block(structure.ends[e].from), *to = graph.Block(structure.ends[e].to);
-      problem_->AddResidualBlock(&costs_[e], graph.is_loop[e] ? &loss_ : nullptr, from, to);
+      problem_->AddResidualBlock(&costs_[e], graph.IsLoop(e) ? &loss_ : nullptr, from, to);
     }
-  }
-
-  void AddCosts(const WeightedGraph<N>& graph) {
-    for (std::size_t e = 0; e < active_.size(); ++e)
-      costs_.emplace_back(graph.constants[e], graph.weights[e]);
   }
 
   std::unique_ptr<ManifoldBase> manifold_;
@@ -149,5 +143,16 @@ class CeresSolver final : public GraphSolver<N> {
   std::vector<bool> active_;               // edges of the problem
   std::optional<ceres::Problem> problem_;  // last: refers to the others
 };
+
+}  // namespace
+
+template <int N>
+std::unique_ptr<GraphSolver<N>> MakeCeresSolver() {
+  return std::make_unique<CeresSolver<N>>();
+}
+
+template std::unique_ptr<GraphSolver<3>> MakeCeresSolver<3>();
+template std::unique_ptr<GraphSolver<6>> MakeCeresSolver<6>();
+template std::unique_ptr<GraphSolver<7>> MakeCeresSolver<7>();
 
 }  // namespace tutti::internal

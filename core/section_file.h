@@ -20,7 +20,7 @@ struct ZSTD_DCtx_s;
 namespace tutti {
 
 /// Tags; those of other modules have other hundreds.
-enum class Section : std::uint32_t {
+enum class OdometrySection : std::uint32_t {
   kHead = 100,        ///< what it was made with, and how much follows
   kKeyframe,          ///< one each
   kLandmarks,         ///< so many together
@@ -31,7 +31,7 @@ enum class Section : std::uint32_t {
   kEndOfOdometry = 199
 };
 
-inline std::uint32_t Tag(Section section) { return static_cast<std::uint32_t>(section); }
+inline std::uint32_t Tag(OdometrySection section) { return static_cast<std::uint32_t>(section); }
 
 namespace internal {
 

@@ -6,9 +6,12 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "apps/python/arrays.h"
 #include "apps/python/bindings.h"
@@ -21,14 +24,44 @@ namespace {
 namespace fs = std::filesystem;
 
 // A SLAM system, and who locates frames in its map once that was asked for.
-struct System {
-  std::unique_ptr<SlamSystem> slam;
-  std::optional<Localizer> localizer;
-  const Odometry* odometry() const { return localizer ? &localizer->odometry() : slam->odometry(); }
-  void CheckMaps(const char* what) const {
-    if (localizer)
-      throw InputError(std::string("frames are only being located in the map: it can't ") + what);
+class System {
+ public:
+  explicit System(std::unique_ptr<SlamSystem> slam) : slam_(std::move(slam)) {}
+
+  TrackResult Track(const InputFrame& frame) {
+    return localizer_ ? localizer_->Track(frame) : slam_->Track(frame);
   }
+  void Finish() {
+    if (!localizer_) slam_->Finish();
+  }
+  void BeginLocalization() { localizer_.emplace(*slam_); }
+  void BeginSession(const CameraRig& rig) {
+    CheckMaps();
+    slam_->BeginSession(rig);
+  }
+  std::size_t Prune() {
+    CheckMaps();
+    return slam_->Prune();
+  }
+  void Save(const fs::path& file) const { slam_->Snapshot().Write(file); }
+  const Odometry* odometry() const { return localizer_ ? &localizer_->odometry() : slam_->odometry(); }
+  bool AppearanceOnly() const { return odometry() == nullptr; }
+  const std::vector<Loop>& loops() const { return slam_->loops(); }
+  PoseGraph Graph() const { return slam_->Graph(); }
+  int Corrections() const { return slam_->Report().corrections; }
+  std::size_t Relocalized() const {
+    return localizer_ ? localizer_->Relocalized() : slam_->Report().relocalized;
+  }
+  std::vector<std::string> TakeWarnings() { return slam_->TakeWarnings(); }
+  std::map<std::string, double> StageMilliseconds() const { return slam_->Report().stage_ms; }
+
+ private:
+  void CheckMaps() const {
+    if (localizer_) throw InputError("frames are being located in the map: it must stay as it is");
+  }
+
+  std::unique_ptr<SlamSystem> slam_;
+  std::optional<Localizer> localizer_;
 };
 using Slam = Guarded<System>;
 
@@ -37,7 +70,7 @@ std::unique_ptr<Slam> MakeSlam(const CameraRig& rig, const std::optional<RunConf
   RunConfig all = config.value_or(RunConfig());
   SetOptions("SlamSystem", "", sections, all);
   const py::gil_scoped_release release;
-  return std::make_unique<Slam>(System{std::make_unique<SlamSystem>(all, rig), {}});
+  return std::make_unique<Slam>(System(std::make_unique<SlamSystem>(all, rig)));
 }
 
 std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads) {
@@ -47,7 +80,7 @@ std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads)
     if (threads) info.config.run.threads = *threads;
     const std::string problem = info.config.run.Validate();
     if (!problem.empty()) throw InputError(problem);
-    return std::make_unique<Slam>(System{LoadMap(file, info), {}});
+    return std::make_unique<Slam>(System(LoadMap(file, info)));
   };
   return Reading(file, load);
 }
@@ -56,7 +89,7 @@ std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads)
 template <class Work>
 auto WithOdometry(Slam& slam, Work work) {
   return slam.Run([&](System& s) {
-    if (s.odometry() == nullptr) throw InputError("the rig has no calibration: there are loops but no poses");
+    if (s.AppearanceOnly()) throw InputError("the rig has no calibration: there are loops but no poses");
     return work(*s.odometry());
   });
 }
@@ -197,17 +230,17 @@ void BindSlamSystem(py::module_& module) {
       .def_static("load", &LoadSlam, "file"_a, "threads"_a = py::none(),
                   "Goes on from a file that save wrote exactly as the saved one would have gone on, with so "
                   "many threads (None: as saved). Raises tutti.InputError for a file that is not usable.")
-      .def("track", Locked(&SlamSystem::Track), "frame"_a, doc::SlamSystem_Track)
-      .def("finish", Locked(&SlamSystem::Finish), doc::SlamSystem_Finish)
+      .def("track", Locked(&System::Track), "frame"_a, doc::SlamSystem_Track)
+      .def("finish", Locked(&System::Finish), doc::SlamSystem_Finish)
       .def(
           "save",
           [](Slam& slam, const fs::path& file) {
-            Writing([&] { slam.Run([&](System& s) { s.slam->Snapshot().Write(file); }); });
+            Writing([&] { slam.Run([&](System& s) { s.Save(file); }); });
           },
           "file"_a, doc::SlamSystem_Snapshot)
-      .def("begin_localization", Locked(&SlamSystem::BeginLocalization), doc::Localizer)
-      .def("begin_session", Locked(&SlamSystem::BeginSession), "rig"_a, doc::SlamSystem_BeginSession)
-      .def("prune", Locked(&SlamSystem::Prune), doc::SlamSystem_Prune)
+      .def("begin_localization", Locked(&System::BeginLocalization), doc::Localizer)
+      .def("begin_session", Locked(&System::BeginSession), "rig"_a, doc::SlamSystem_BeginSession)
+      .def("prune", Locked(&System::Prune), doc::SlamSystem_Prune)
       .def(
           "trajectory",
           [](Slam& slam, int piece) {
@@ -226,16 +259,16 @@ void BindSlamSystem(py::module_& module) {
           },
           doc::Map_KeyframeIds)
       .def("landmarks", &Landmarks, "(N, 3) float64: points of the map in the world [m], by id.")
-      .def_property_readonly("loops", Locked(&SlamSystem::loops), doc::SlamSystem_loops)
+      .def_property_readonly("loops", Locked(&System::loops), doc::SlamSystem_loops)
       .def(
           "graph",
-          [](Slam& slam) { return std::make_unique<Guarded<PoseGraph>>(Locked(&SlamSystem::Graph)(slam)); },
+          [](Slam& slam) { return std::make_unique<Guarded<PoseGraph>>(Locked(&System::Graph)(slam)); },
           doc::SlamSystem_Graph)
-      .def_property_readonly("appearance_only", Locked(&SlamSystem::AppearanceOnly), doc::SlamSystem_odometry)
-      .def_property_readonly("corrections", Locked(&SlamSystem::Corrections), doc::SlamReport_corrections)
-      .def_property_readonly("relocalized", Locked(&SlamSystem::Relocalized), doc::SlamReport_relocalized)
-      .def("take_warnings", Locked(&SlamSystem::TakeWarnings), doc::SlamSystem_TakeWarnings)
-      .def_property_readonly("stage_ms", Locked(&SlamSystem::StageMilliseconds), doc::SlamReport_stage_ms);
+      .def_property_readonly("appearance_only", Locked(&System::AppearanceOnly), doc::SlamSystem_odometry)
+      .def_property_readonly("corrections", Locked(&System::Corrections), doc::SlamReport_corrections)
+      .def_property_readonly("relocalized", Locked(&System::Relocalized), doc::SlamReport_relocalized)
+      .def("take_warnings", Locked(&System::TakeWarnings), doc::SlamSystem_TakeWarnings)
+      .def_property_readonly("stage_ms", Locked(&System::StageMilliseconds), doc::SlamReport_stage_ms);
 }
 
 }  // namespace tutti::python

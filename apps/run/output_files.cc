@@ -56,7 +56,7 @@ TrajectoryPlot MakePlot(const RunResult& result) {
   for (const Loop& loop : result.loops) {
     const auto a = places.AtEnd(loop.candidate, loop.candidate_stamp_s),
                b = places.AtEnd(loop.query, loop.query_stamp_s);
-    if (loop.accepted && a && b) plot.edges.emplace_back(*a, *b);
+    if (loop.accepted() && a && b) plot.edges.emplace_back(*a, *b);
   }
   plot.edges_name = "accepted loops (" + std::to_string(result.LoopsAccepted()) + ")";
   for (const FoundFrame& frame : result.found) {

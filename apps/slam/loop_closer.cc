@@ -70,7 +70,7 @@ void LoopCloser::BeginSession(const CameraRig& rig, std::int64_t first_frame, in
   session_ = first_frame;
   sessions_.push_back(first_frame);
   keyframes_seen_ = 0;
-  graph_.BeginSession(first_keyframe);
+  graph_.Append(first_keyframe);
   proof_.reset();
   corrections_ = adjustments_ = 0;
   stages_.clear();

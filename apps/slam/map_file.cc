@@ -44,7 +44,7 @@ void MapSnapshot::Write(const std::filesystem::path& file,
     int keyframe = 0;
     OdometryFile::Save(*parts_->odometry, [&](std::uint32_t tag, std::string_view bytes) {
       const std::uint64_t place = out.Write(tag, bytes);
-      if (tag == Tag(Section::kKeyframe))
+      if (tag == Tag(OdometrySection::kKeyframe))
         keyframes[parts_->odometry->map().keyframe(keyframe++).frame_index] = place;
     });
   }

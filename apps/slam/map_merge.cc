@@ -65,8 +65,7 @@ void MapMerge::AppendLoops() {
   loops.session_ = first_frame_;
   loops.sessions_.push_back(first_frame_);
   for (const std::int64_t begin : others.sessions_) loops.sessions_.push_back(first_frame_ + begin);
-  loops.graph_.BeginSession(first_keyframe_);
-  loops.graph_.Append(others.graph_, first_keyframe_);
+  loops.graph_.Append(first_keyframe_, &others.graph_);
   loops.proof_.reset();
   loops.corrections_ = loops.adjustments_ = 0;
   const std::size_t first_loop = loops.loops_.size();

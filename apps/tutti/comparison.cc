@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "apps/report/page.h"
-#include "apps/report/run_report.h"
 #include "apps/tutti/files.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"

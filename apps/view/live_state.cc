@@ -27,7 +27,7 @@ std::vector<LivePlace> PlacesOf(const RunState& state) {
 std::vector<LiveLoop> LoopsOf(const RunState& state) {
   std::vector<LiveLoop> loops;
   for (const Loop& record : state.loops) {
-    if (record.verified) loops.push_back({record.query, record.candidate, record.accepted});
+    if (record.verified) loops.push_back({record.query, record.candidate, record.accepted()});
   }
   return loops;
 }

@@ -137,13 +137,11 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
   for (Edge& edge : edges_) edge.S_older_newer = Measured(edge.older, edge.newer);
 }
 
-void KeyframeGraph::BeginSession(int first_keyframe) {
+void KeyframeGraph::Append(int first_keyframe, const KeyframeGraph* other) {
   MeasureAgain();
   sessions_.push_back(first_keyframe);
-}
-
-void KeyframeGraph::Append(const KeyframeGraph& other, int first_keyframe) {
-  for (const int begin : other.sessions_) sessions_.push_back(first_keyframe + begin);
+  if (other == nullptr) return;
+  for (const int begin : other->sessions_) sessions_.push_back(first_keyframe + begin);
 }
 
 bool KeyframeGraph::Begins(int keyframe) const {

@@ -142,7 +142,7 @@ void ReadLandmarks(int count, internal::StateReader& in, Map* map) {
 
 // Reads the next section into what `read` is given to an archive.
 template <class Read>
-void ReadSection(Section section, internal::SectionReader* file, internal::SharedObjectsIn* shared,
+void ReadSection(OdometrySection section, internal::SectionReader* file, internal::SharedObjectsIn* shared,
                  const Read& read) {
   const std::string bytes = file->Expect(Tag(section));
   internal::StateReader in(bytes, file->name(), shared);
@@ -164,24 +164,24 @@ struct Head {
 
 void Odometry::Impl::Save(const internal::SectionSink& sink) const {
   internal::SharedObjectsOut shared;
-  const auto write = [&](Section section, const auto& put) {
+  const auto write = [&](OdometrySection section, const auto& put) {
     internal::StateWriter out(&shared);
     put(out);
     sink(Tag(section), out.Take());
   };
   const Head head{Fingerprint(rig_, map().scales()), map().KeyframeCount(), map().LandmarkCount(),
                   map().NextPiece()};
-  write(Section::kHead, [&](auto& out) { out(head); });
+  write(OdometrySection::kHead, [&](auto& out) { out(head); });
   for (int id = 0; id < head.keyframes; ++id) {
     const tutti::Keyframe& keyframe = map().keyframe(id);
     // Before it: what is like the keyframe, a view, is like none of its image.
     if (keyframe.features->pyramid)
-      write(Section::kImage, [&](auto& out) { out(keyframe.features->pyramid); });
-    write(Section::kKeyframe, [&](auto& out) { out(keyframe); });
+      write(OdometrySection::kImage, [&](auto& out) { out(keyframe.features->pyramid); });
+    write(OdometrySection::kKeyframe, [&](auto& out) { out(keyframe); });
   }
   for (int first = 0; first < head.landmarks; first += kLandmarksPerSection) {
     const int end = std::min(first + kLandmarksPerSection, head.landmarks);
-    write(Section::kLandmarks, [&](auto& out) {
+    write(OdometrySection::kLandmarks, [&](auto& out) {
       for (int id = first; id < end; ++id) {
         const Landmark& landmark = map().landmark(id);
         out(landmark.alive);
@@ -199,15 +199,15 @@ void Odometry::Impl::Save(const internal::SectionSink& sink) const {
       out(descriptors);
     });
   }
-  write(Section::kTracking, [&](auto& out) { out(*this); });
-  write(Section::kTimes, [&](auto& out) { out(stages_.milliseconds); });
-  sink(Tag(Section::kEndOfOdometry), "");
+  write(OdometrySection::kTracking, [&](auto& out) { out(*this); });
+  write(OdometrySection::kTimes, [&](auto& out) { out(stages_.milliseconds); });
+  sink(Tag(OdometrySection::kEndOfOdometry), "");
 }
 
 void Odometry::Impl::Load(internal::SectionReader* file) {
   internal::SharedObjectsIn shared;
   Head head;
-  ReadSection(Section::kHead, file, &shared, [&](auto& in) { in(head); });
+  ReadSection(OdometrySection::kHead, file, &shared, [&](auto& in) { in(head); });
   const std::string here = Fingerprint(rig_, map().scales());
   if (head.fingerprint != here) {
     throw InputError(file->name() + ": was saved with another camera or image pyramid (" + head.fingerprint +
@@ -216,22 +216,22 @@ void Odometry::Impl::Load(internal::SectionReader* file) {
   Map* const map = mapper_.RestoredMap();
   for (int id = 0; id < head.keyframes; ++id) {
     std::shared_ptr<const Pyramid> image;
-    if (file->Peek() == Tag(Section::kImage))
-      ReadSection(Section::kImage, file, &shared, [&](auto& in) { in(image); });
+    if (file->Peek() == Tag(OdometrySection::kImage))
+      ReadSection(OdometrySection::kImage, file, &shared, [&](auto& in) { in(image); });
     tutti::Keyframe keyframe;
-    ReadSection(Section::kKeyframe, file, &shared, [&](auto& in) { in(keyframe); });
+    ReadSection(OdometrySection::kKeyframe, file, &shared, [&](auto& in) { in(keyframe); });
     map->Restore(std::move(keyframe));
   }
   internal::CheckIndex(head.pieces, map->NextPiece(), kMostPieces + 1, *file);
   map->RestorePieces(head.pieces);
   for (int first = 0; first < head.landmarks; first += kLandmarksPerSection) {
-    ReadSection(Section::kLandmarks, file, &shared, [&](auto& in) {
+    ReadSection(OdometrySection::kLandmarks, file, &shared, [&](auto& in) {
       ReadLandmarks(std::min(kLandmarksPerSection, head.landmarks - first), in, map);
     });
   }
-  ReadSection(Section::kTracking, file, &shared, [&](auto& in) { in(*this); });
-  ReadSection(Section::kTimes, file, &shared, [&](auto& in) { in(stages_.milliseconds); });
-  file->Expect(Tag(Section::kEndOfOdometry));
+  ReadSection(OdometrySection::kTracking, file, &shared, [&](auto& in) { in(*this); });
+  ReadSection(OdometrySection::kTimes, file, &shared, [&](auto& in) { in(stages_.milliseconds); });
+  file->Expect(Tag(OdometrySection::kEndOfOdometry));
   Check(*file);
   mapper_.Resume(stages_);
 }
@@ -269,14 +269,14 @@ void OdometryFile::Save(const GlobalAdjustment& adjustment, const Sink& sink) {
   internal::SharedObjectsOut shared;
   internal::StateWriter out(&shared);
   out(adjustment.work_->moving(), adjustment.work_->Result());
-  sink(Tag(Section::kGlobalAdjustment), out.Take());
+  sink(Tag(OdometrySection::kGlobalAdjustment), out.Take());
 }
 
 GlobalAdjustment OdometryFile::LoadAdjustment(const Map& map, internal::SectionReader* file) {
   std::vector<int> moving;
   GlobalAdjustment::Work::Outcome outcome;
   internal::SharedObjectsIn shared;
-  ReadSection(Section::kGlobalAdjustment, file, &shared, [&](auto& in) { in(moving, outcome); });
+  ReadSection(OdometrySection::kGlobalAdjustment, file, &shared, [&](auto& in) { in(moving, outcome); });
   for (const int id : moving) internal::CheckKeyframe(id, map, *file);
   if (outcome.S_world_keyframe.size() != (outcome.better ? moving.size() : 0))
     file->Damaged("an adjustment without its poses");

@@ -48,7 +48,7 @@ class LoopReachTest : public ::testing::Test {
     return recording_.truth[static_cast<std::size_t>(odometry_.map().keyframe(id).frame_index)].pose;
   }
   /// What is true, but for the later end, which is `off` [m] to the side and turned.
-  LoopEdge Loop(int candidate, int query, double off, double turned_deg = 0) const {
+  LoopEdge EdgeOf(int candidate, int query, double off, double turned_deg = 0) const {
     LoopEdge loop;
     loop.candidate = candidate;
     loop.query = query;
@@ -68,27 +68,28 @@ class LoopReachTest : public ::testing::Test {
 
 TEST_F(LoopReachTest, NoCameraJumpsWhileTrackingIsLost) {
   for (const int query : {after_.front(), after_.back()}) {
-    EXPECT_EQ(WhyImpossible(Loop(before_.front(), query, 0), odometry_.map(), Sensor::kRgbd), "");
-    EXPECT_EQ(WhyImpossible(Loop(before_.front(), query, 1), odometry_.map(), Sensor::kRgbd), "");
-    EXPECT_THAT(WhyImpossible(Loop(before_.front(), query, 60), odometry_.map(), Sensor::kRgbd),
+    EXPECT_EQ(WhyImpossible(EdgeOf(before_.front(), query, 0), odometry_.map(), Sensor::kRgbd), "");
+    EXPECT_EQ(WhyImpossible(EdgeOf(before_.front(), query, 1), odometry_.map(), Sensor::kRgbd), "");
+    EXPECT_THAT(WhyImpossible(EdgeOf(before_.front(), query, 60), odometry_.map(), Sensor::kRgbd),
                 HasSubstr("would have jumped by"));
   }
 }
 
 TEST_F(LoopReachTest, WhereItWasTurnedToWhileTrackingIsLostIsAnyones) {
-  EXPECT_EQ(WhyImpossible(Loop(before_.back(), after_.front(), 0, 150), odometry_.map(), Sensor::kRgbd), "");
+  EXPECT_EQ(WhyImpossible(EdgeOf(before_.back(), after_.front(), 0, 150), odometry_.map(), Sensor::kRgbd),
+            "");
 }
 
 TEST_F(LoopReachTest, NoOdometryIsTurnedByARightAngle) {
-  EXPECT_EQ(WhyImpossible(Loop(after_.front(), after_.back(), 0, 40), odometry_.map(), Sensor::kRgbd), "");
-  EXPECT_THAT(WhyImpossible(Loop(after_.front(), after_.back(), 0, 90), odometry_.map(), Sensor::kRgbd),
+  EXPECT_EQ(WhyImpossible(EdgeOf(after_.front(), after_.back(), 0, 40), odometry_.map(), Sensor::kRgbd), "");
+  EXPECT_THAT(WhyImpossible(EdgeOf(after_.front(), after_.back(), 0, 90), odometry_.map(), Sensor::kRgbd),
               HasSubstr("turn by 90 deg"));
 }
 
 TEST_F(LoopReachTest, AnOdometryIsNotOffByMoreThanHalfOfTheWay) {
-  EXPECT_TRUE(InReach(Loop(after_.front(), after_.back(), 0), odometry_.map()));
-  EXPECT_FALSE(InReach(Loop(after_.front(), after_.back(), 60), odometry_.map()));
-  EXPECT_TRUE(InReach(Loop(before_.front(), after_.back(), 60), odometry_.map())) << "not of one piece";
+  EXPECT_TRUE(InReach(EdgeOf(after_.front(), after_.back(), 0), odometry_.map()));
+  EXPECT_FALSE(InReach(EdgeOf(after_.front(), after_.back(), 60), odometry_.map()));
+  EXPECT_TRUE(InReach(EdgeOf(before_.front(), after_.back(), 60), odometry_.map())) << "not of one piece";
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ KeyframeGraph Line() {
 }
 
 // The truth, 39 m, or off by `error` [m].
-LoopEdge Loop(std::size_t record, int candidate, int query, double error = 0) {
+LoopEdge EdgeOf(std::size_t record, int candidate, int query, double error = 0) {
   LoopEdge loop;
   loop.candidate = candidate;
   loop.query = query;
@@ -33,7 +33,7 @@ LoopEdge Loop(std::size_t record, int candidate, int query, double error = 0) {
 }
 
 TEST(LoopSolver, ATrueLoopMovesTheMapOntoIt) {
-  const LoopSolution solution = SolveLoops(Line(), {}, {Loop(0, 0, 39)}, SlamOptions());
+  const LoopSolution solution = SolveLoops(Line(), {}, {EdgeOf(0, 0, 39)}, SlamOptions());
   ASSERT_TRUE(solution.moves);
   EXPECT_EQ(solution.verdicts[0].reason, "");
   EXPECT_GT(solution.verdicts[0].weight, 0);
@@ -42,9 +42,9 @@ TEST(LoopSolver, ATrueLoopMovesTheMapOntoIt) {
 }
 
 TEST(LoopSolver, ALoopThatContradictsTheOthersLeavesWithItsReason) {
-  const std::vector<LoopEdge> accepted = {Loop(0, 0, 39), Loop(1, 1, 38), Loop(2, 2, 37)};
+  const std::vector<LoopEdge> accepted = {EdgeOf(0, 0, 39), EdgeOf(1, 1, 38), EdgeOf(2, 2, 37)};
   const LoopSolution solution =
-      SolveLoops(Line(), accepted, {Loop(3, 3, 36), Loop(4, 0, 39, -20)}, SlamOptions());
+      SolveLoops(Line(), accepted, {EdgeOf(3, 3, 36), EdgeOf(4, 0, 39, -20)}, SlamOptions());
   ASSERT_TRUE(solution.moves);
   EXPECT_EQ(solution.verdicts[0].reason, "");
   EXPECT_NE(solution.verdicts[1].reason, "");
@@ -55,7 +55,7 @@ TEST(LoopSolver, ALoopThatContradictsTheOthersLeavesWithItsReason) {
 // As far as Huber's loss lets it, the map bends to it: only its weight tells.
 TEST(LoopSolver, ALoopThatKeepsLessThanHalfOfItsWeightLeaves) {
   const auto verdict = [](double error) {
-    return SolveLoops(Line(), {}, {Loop(0, 0, 39, error)}, SlamOptions()).verdicts[0];
+    return SolveLoops(Line(), {}, {EdgeOf(0, 0, 39, error)}, SlamOptions()).verdicts[0];
   };
   EXPECT_EQ(verdict(-8).reason, "");
   EXPECT_NE(verdict(-8.7).reason.find("leaves it 33 % of its weight"), std::string::npos);
@@ -63,7 +63,8 @@ TEST(LoopSolver, ALoopThatKeepsLessThanHalfOfItsWeightLeaves) {
 }
 
 TEST(LoopSolver, NothingMovesWhereNoneMayStay) {
-  const LoopSolution solution = SolveLoops(Line(), {Loop(0, 0, 39)}, {Loop(1, 0, 39, -20)}, SlamOptions());
+  const LoopSolution solution =
+      SolveLoops(Line(), {EdgeOf(0, 0, 39)}, {EdgeOf(1, 0, 39, -20)}, SlamOptions());
   EXPECT_FALSE(solution.moves);
   EXPECT_TRUE(solution.verdicts[0].contradicted);
 }
@@ -71,7 +72,7 @@ TEST(LoopSolver, NothingMovesWhereNoneMayStay) {
 TEST(LoopSolver, TheGateRefusesWhatTheMapCanNotHaveDriftedTo) {
   SlamOptions options;
   options.loop_gate_sigmas = 5;
-  const LoopSolution solution = SolveLoops(Line(), {}, {Loop(0, 0, 39), Loop(1, 0, 39, -30)}, options);
+  const LoopSolution solution = SolveLoops(Line(), {}, {EdgeOf(0, 0, 39), EdgeOf(1, 0, 39, -30)}, options);
   ASSERT_TRUE(solution.moves);
   ASSERT_TRUE(solution.verdicts[0].gate_sigmas && solution.verdicts[1].gate_sigmas);
   EXPECT_LT(*solution.verdicts[0].gate_sigmas, 5);
@@ -80,13 +81,13 @@ TEST(LoopSolver, TheGateRefusesWhatTheMapCanNotHaveDriftedTo) {
 }
 
 TEST(LoopSolver, BesideTheTrackingItFindsTheSame) {
-  const LoopSolution here = SolveLoops(Line(), {}, {Loop(0, 0, 39)}, SlamOptions());
+  const LoopSolution here = SolveLoops(Line(), {}, {EdgeOf(0, 0, 39)}, SlamOptions());
   for (const int threads : {1, 2}) {
     SlamOptions options;
     options.threads = threads;
     BackgroundLoopSolver solver;
     EXPECT_FALSE(solver.Running());
-    solver.Start(Line(), {}, {Loop(0, 0, 39)}, options, nullptr);
+    solver.Start(Line(), {}, {EdgeOf(0, 0, 39)}, options, nullptr);
     EXPECT_TRUE(solver.Running());
     const LoopSolution there = solver.Take();
     EXPECT_FALSE(solver.Running());

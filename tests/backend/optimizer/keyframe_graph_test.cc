@@ -444,7 +444,7 @@ TEST(KeyframeGraph, ARecordingThatBeginsIsTiedToWhatItSees) {
   };
   const std::vector<MapKeyframe> keyframes = StraightLine(40);
   KeyframeGraph graph, before;
-  graph.BeginSession(30);
+  graph.Append(30);
   graph.Update(keyframes, {{4, 30, 80}});
   before.Update(keyframes, {{4, 30, 80}});
   auto expected = edges(before);

@@ -103,12 +103,9 @@ class KeyframeGraph {
   void Update(std::vector<MapKeyframe> keyframes, const std::vector<CovisiblePair>& covisible = {});
 
   /// Keyframes from this id on are of another recording, which did not begin where the one before ended: no
-  /// odometry connects the two. What the map has become says more of the older ones than what was kept.
-  void BeginSession(int first_keyframe);
-
-  /// The session that has just begun with this keyframe is another map: further recordings begin in it as
-  /// they do in its graph.
-  void Append(const KeyframeGraph& other, int first_keyframe);
+  /// odometry connects the two. What the map has become says more of the older ones than what was kept. They
+  /// may be those of another map: further recordings begin in it as they do in its graph.
+  void Append(int first_keyframe, const KeyframeGraph* other = nullptr);
 
   /// The graph with these loops; poses as they are in the map. Pieces that loops join are moved into the
   /// frame of the older one.

@@ -18,8 +18,8 @@ namespace tutti::internal {
 
 /// One diagonal block for each unknown, one block below the diagonal for each pair of them that edges join.
 struct BlockPattern {
+  int unknowns = 0;          ///< before what counts them
   std::vector<int> unknown;  ///< parallel to nodes; -1: does not move
-  int unknowns = 0;
   std::vector<std::pair<int, int>> pairs;  ///< of unknowns, the larger one first; ascending, each once
   std::vector<std::size_t> pair_of_edge;   ///< parallel to edges; 0 where an end does not move
 

@@ -149,7 +149,7 @@ class LoopCloser {
   void Applied(const Update& update, const std::vector<int>& common, const Odometry& odometry,
                std::int64_t frames);
   void Withdraw(std::int64_t query_frame, const std::string& reason, bool has_graph);
-  void Settle(const LoopVerdict& verdict);
+  void TakeVerdict(const LoopVerdict& verdict);
   void Revoke(Loop* loop);
   void Fuse(const std::vector<std::size_t>& loops, Update* update) const;
   LoopConstraint Measure(const Verification& verification, int candidate, int query, const Map& map);

@@ -147,7 +147,7 @@ LoopCloser::Update LoopCloser::Consider(Loop proposed, const Verification& verif
   if (followed_.ImagesJudgeSteps()) gate_.SetOdometryUncertainty(followed_.Seen());
   const std::vector<std::size_t> waiting = InState(LoopState::kWaiting);
   const LoopGate::Admitted admitted =
-      gate_.Offer(loop.edge, EdgesOf(waiting), EdgesOf(InState(LoopState::kInMap)), PlacesIn(map), across,
+      gate_.Admit(loop.edge, EdgesOf(waiting), EdgesOf(InState(LoopState::kInMap)), PlacesIn(map), across,
                   [&](const LoopEdge& edge) { return TrustIn(edge, map); });
   if (admitted.loops.empty()) {
     SetState(index, LoopState::kWaiting);
@@ -286,7 +286,7 @@ std::optional<LoopCloser::Update> LoopCloser::Solved(const Odometry& odometry, s
   const internal::Stopwatch watch;
   const LoopSolution solution = solver_.Take();
   stages_["loop_solve"] += solution.time_ms;
-  for (const LoopVerdict& verdict : solution.verdicts) Settle(verdict);
+  for (const LoopVerdict& verdict : solution.verdicts) TakeVerdict(verdict);
   Update update;
   if (solution.moves) {
     const std::vector<std::size_t> accepted = InState(LoopState::kInMap);
@@ -313,7 +313,7 @@ std::optional<LoopCloser::Update> LoopCloser::Solved(const Odometry& odometry, s
 MapCorrection LoopCloser::MoveBy(const KeyframeCorrection& solved, const Odometry& odometry) {
   MapCorrection correction;
   const std::vector<MapKeyframe> now = KeyframesOf(odometry.map());
-  correction.S_world_keyframe = tutti::Follow(solved, solved_keyframes_, now);
+  correction.S_world_keyframe = MovedAsSolved(solved, solved_keyframes_, now);
   correction.merges = solved.merges;
   ++corrections_;
   graph_.Update(now, Covisible(odometry.map()));
@@ -391,12 +391,12 @@ bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
     Solve(deferred, odometry, frames);
     return true;
   }
-  for (const LoopEdge& edge : EdgesOf(deferred)) Settle({edge, "", false, 1, std::nullopt});
+  for (const LoopEdge& edge : EdgesOf(deferred)) TakeVerdict({edge, "", false, 1, std::nullopt});
   return false;
 }
 
 // Into the map, or out.
-void LoopCloser::Settle(const LoopVerdict& verdict) {
+void LoopCloser::TakeVerdict(const LoopVerdict& verdict) {
   Loop& loop = loops_[verdict.loop.record];
   SetState(verdict.loop.record, verdict.reason.empty() ? LoopState::kInMap : LoopState::kRejected);
   loop.reason = verdict.reason;

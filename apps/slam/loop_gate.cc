@@ -113,7 +113,7 @@ bool LoopGate::Independent(const LoopEdge& a, const LoopEdge& b, const Places& m
   return differ(a.query, b.query) && differ(a.candidate, b.candidate);
 }
 
-LoopGate::Admitted LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& waiting,
+LoopGate::Admitted LoopGate::Admit(const LoopEdge& loop, const std::vector<LoopEdge>& waiting,
                                    const std::vector<LoopEdge>& accepted, const Places& map, bool across,
                                    const Trusts& trusts) const {
   const auto trust_in = [&trusts](const LoopEdge& l) { return trusts ? trusts(l) : Trust::kSure; };

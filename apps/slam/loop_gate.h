@@ -38,7 +38,7 @@ class LoopGate {
   /// odometry would have to have failed altogether; three that saw different things must say so.
   enum class Trust { kSure, kFar, kWeak };
   using Trusts = std::function<Trust(const LoopEdge& loop)>;
-  /// What Offer lets in, and which loop it agrees with; none: the map says the same, or nothing was asked
+  /// What Admit lets in, and which loop it agrees with; none: the map says the same, or nothing was asked
   /// for.
   struct Admitted {
     std::vector<LoopEdge> loops;
@@ -58,7 +58,7 @@ class LoopGate {
   /// side by side in the map, at both ends: drives at different times that are tied to each other. A loop
   /// between the same two keyframes is not another one. `trusts`: of `loop` and those that wait; empty:
   /// kSure.
-  Admitted Offer(const LoopEdge& loop, const std::vector<LoopEdge>& waiting,
+  Admitted Admit(const LoopEdge& loop, const std::vector<LoopEdge>& waiting,
                  const std::vector<LoopEdge>& accepted, const Places& map, bool across = false,
                  const Trusts& trusts = {}) const;
 

@@ -132,8 +132,9 @@ LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>&
   return out;
 }
 
-std::map<int, Similarity> Follow(const KeyframeCorrection& solved, const std::vector<MapKeyframe>& then,
-                                 const std::vector<MapKeyframe>& now) {
+std::map<int, Similarity> MovedAsSolved(const KeyframeCorrection& solved,
+                                        const std::vector<MapKeyframe>& then,
+                                        const std::vector<MapKeyframe>& now) {
   std::map<int, Similarity> out;
   std::map<int, Similarity> newest;  // motion of the newest known keyframe, by map piece
   auto before = then.begin();

@@ -52,8 +52,9 @@ LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>&
 
 /// The map as it is now (`now`), moved as the solution moves the map that it was made from (`then`): what
 /// mapping has found since stays, and keyframes that came since follow the newest one of their map piece.
-std::map<int, Similarity> Follow(const KeyframeCorrection& solved, const std::vector<MapKeyframe>& then,
-                                 const std::vector<MapKeyframe>& now);
+std::map<int, Similarity> MovedAsSolved(const KeyframeCorrection& solved,
+                                        const std::vector<MapKeyframe>& then,
+                                        const std::vector<MapKeyframe>& now);
 
 /// Frames from the begin of a solution until it enters: far more than Ceres takes for so many keyframes
 /// (docs/backend.md), so that nobody waits for it.

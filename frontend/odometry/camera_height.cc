@@ -219,7 +219,7 @@ bool CameraHeight::IsPossible() const {
          std::isfinite(share_) && std::isfinite(spread_) && std::isfinite(bias_);
 }
 
-void CameraHeight::Follow(double scale) {
+void CameraHeight::Rescale(double scale) {
   reference_ += std::log(scale);
   known_speed_ += std::log(scale);
   Scale(scale);

@@ -29,7 +29,7 @@ class CameraHeight {
   /// The map around the camera was made larger by this factor, to take a drift out.
   void Correct(double scale);
   /// It was, since a loop says so: it is right there.
-  void Follow(double scale);
+  void Rescale(double scale);
 
   /// What is known, and what was corrected so far; none: nothing is.
   std::optional<HeightFound> Found() const;

@@ -30,7 +30,8 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       rolling_start_(rig),
       relocalizer_(options, rig),
       follower_(options, rig),
-      localizer_(options, rig) {}
+      localizer_(options, rig),
+      keeps_height_(rig.sensor == Sensor::kMono && options.keep_height) {}
 
 void Odometry::Impl::GoOn(const Impl& before, Map map, std::int64_t frame_offset) {
   UseOwnThreads(before.mapper_.own_threads());
@@ -52,22 +53,30 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
     result_.features = static_cast<int>(frame.features->size());
     return result_;
   }
-  const bool few = !input.features && localizer_.features() < options_.features;
-  TrackedFrame frame = Prepare(input, localizer_.features());
   const Pose T_last_world = last().T_camera_world;
-  const std::optional<Tracker> before = few ? std::optional(tracker_) : std::nullopt;
-  Tracker::Tracked tracked = Look(frame);
-  if (few && (!tracked.fix || localizer_.Doubts(*tracked.fix, last().frames_since_keyframe))) {
-    tracker_ = *before;
-    frame = Prepare(input, options_.features);
-    tracked = Look(frame);
-  }
-  if (tracked.fix && rig_.sensor == Sensor::kMono && options_.keep_height && !localizer_.Begun())
+  const auto [frame, tracked] = Look(input);
+  if (tracked.fix && keeps_height_)
     height_.See(rig_.camera, frame.features, last().T_camera_world, T_last_world,
                 map().MedianDepth(last().reference));
   result_ = TrackMap(frame, tracked);
   result_.features = static_cast<int>(frame.features->size());
   return result_;
+}
+
+// With as many features as the pose needs; where those leave a doubt, once more with all.
+std::pair<TrackedFrame, Tracker::Tracked> Odometry::Impl::Look(const InputFrame& input) {
+  const int features = localizer_.features();
+  const bool few = !input.features && features < options_.features;
+  const std::optional<Tracker> before = few ? std::optional(tracker_) : std::nullopt;
+  TrackedFrame frame = Prepare(input, features);
+  Tracker::Tracked tracked = Look(frame);
+  const bool doubtful =
+      few && (!tracked.fix || localizer_.Doubts(*tracked.fix, last().frames_since_keyframe));
+  if (!doubtful) return {std::move(frame), std::move(tracked)};
+  tracker_ = *before;
+  frame = Prepare(input, options_.features);
+  tracked = Look(frame);
+  return {std::move(frame), std::move(tracked)};
 }
 
 Tracker::Tracked Odometry::Impl::Look(const TrackedFrame& frame) {
@@ -216,6 +225,7 @@ TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
 void Odometry::Impl::BeginLocalization() {
   EnterMapping();
   localizer_.Begin(map());
+  keeps_height_ = false;
   mapper_.KeepMap();
   initializer_.Reset();
   tracker_.Forget();
@@ -333,7 +343,7 @@ std::vector<int> Odometry::Impl::Correct(const MapCorrection& correction) {
   if (!correction.S_world_keyframe.empty()) {
     first_unmoved_ = map().KeyframeCount();
     const auto here = correction.S_world_keyframe.find(last().reference);
-    if (here != correction.S_world_keyframe.end()) height_.Follow(here->second.scale);
+    if (here != correction.S_world_keyframe.end()) height_.Rescale(here->second.scale);
     MoveMap(correction);
   }
   std::vector<int> common;

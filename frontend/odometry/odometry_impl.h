@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/section_file.h"
@@ -78,6 +79,7 @@ class Odometry::Impl {
 
  private:
   TrackedFrame Prepare(const InputFrame& input, int features);
+  std::pair<TrackedFrame, Tracker::Tracked> Look(const InputFrame& input);
   Tracker::Tracked Look(const TrackedFrame& frame);
   Tracker::Tracked LookFromStart(const TrackedFrame& frame);
   TrackResult Initialize(const TrackedFrame& frame);
@@ -102,6 +104,7 @@ class Odometry::Impl {
   Relocalizer relocalizer_;
   PoseFollower follower_;
   Localizer localizer_;
+  bool keeps_height_;  // of one camera, while it makes a map
   CameraHeight height_;
   TrackResult result_;                               // of the last frame
   std::vector<double> row_errors_, stereo_matches_;  // stereo: of each pair

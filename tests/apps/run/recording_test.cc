@@ -84,7 +84,7 @@ TEST(Recording, OfKittiWithTwoCamerasIsStereoWithItsOwnCalibration) {
 }
 
 TEST(Recording, OfPairsWithoutACalibrationIsOneCameraWithAGuess) {
-  const fs::path kitti = KittiTown(), pairs = testing::FreshFolder() / "pairs";
+  const fs::path kitti = KittiTown(), pairs = kitti.parent_path() / "pairs";
   fs::remove(kitti / "calib.txt");
   for (const char* camera : {"cam0", "cam1"}) WriteImages(pairs / camera);
   for (const fs::path& folder : {kitti, pairs}) {

@@ -31,9 +31,9 @@ LoopEdge LoopTo(int candidate, double error = 0) {
 class Gate : public LoopGate {
  public:
   using LoopGate::LoopGate;
-  Admitted Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Places& map,
+  Admitted Admit(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Places& map,
                  bool across = false, const Trusts& trusts = {}) {
-    Admitted admitted = LoopGate::Offer(loop, waiting_, accepted, map, across, trusts);
+    Admitted admitted = LoopGate::Admit(loop, waiting_, accepted, map, across, trusts);
     if (admitted.loops.empty()) waiting_.push_back(loop);
     for (const LoopEdge& entering : admitted.loops) {
       waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(),
@@ -50,9 +50,9 @@ class Gate : public LoopGate {
 
 TEST(LoopGate, FirstLoopWaitsAndEntersWithTheSecondThatAgrees) {
   Gate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
   ASSERT_EQ(gate.waiting().size(), 1u);
-  const auto entering = gate.Offer(LoopTo(12), {}, PlaceOf).loops;
+  const auto entering = gate.Admit(LoopTo(12), {}, PlaceOf).loops;
   ASSERT_EQ(entering.size(), 2u);
   EXPECT_EQ(entering[0].candidate, 10);
   EXPECT_EQ(entering[1].candidate, 12);
@@ -61,9 +61,9 @@ TEST(LoopGate, FirstLoopWaitsAndEntersWithTheSecondThatAgrees) {
 
 TEST(LoopGate, LoopsThatContradictEachOtherStayOut) {
   Gate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
-  EXPECT_TRUE(gate.Offer(LoopTo(12, 3.0), {}, PlaceOf).loops.empty());
-  EXPECT_TRUE(gate.Offer(LoopTo(14, -3.0), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(12, 3.0), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(14, -3.0), {}, PlaceOf).loops.empty());
   EXPECT_EQ(gate.waiting().size(), 3u);
 }
 
@@ -71,8 +71,8 @@ TEST(LoopGate, LoopsAgreeWhereABadOdometryMayHaveDriftedByTheirDifference) {
   const auto enter = [](const OdometryUncertainty::Sigmas& step, const LoopEdge& second) {
     Gate gate{SlamOptions()};
     gate.SetOdometryUncertainty(step);
-    gate.Offer(LoopTo(10), {}, PlaceOf);
-    return gate.Offer(second, {}, PlaceOf).loops.size();
+    gate.Admit(LoopTo(10), {}, PlaceOf);
+    return gate.Admit(second, {}, PlaceOf).loops.size();
   };
   const OdometryUncertainty::Sigmas good{0.005, 0.0005}, bad{0.05, 0.01};
   const LoopEdge shifted = LoopTo(12, 0.5), shifted_more = LoopTo(12, 1.0);  // 4 m on, 0.2 m is the limit
@@ -89,15 +89,15 @@ TEST(LoopGate, LoopsAgreeWhereABadOdometryMayHaveDriftedByTheirDifference) {
 
 TEST(LoopGate, LoopsFarApartDoNotVouchForEachOther) {
   Gate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(LoopTo(1), {}, PlaceOf).loops.empty());
-  EXPECT_TRUE(gate.Offer(LoopTo(90), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(1), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(90), {}, PlaceOf).loops.empty());
 }
 
 TEST(LoopGate, LoopThatTheMapAlreadySaysEntersAlone) {
   Gate gate{SlamOptions()};
   LoopEdge loop = LoopTo(10);
   loop.S_candidate_query.translation = {5, 0, 0};  // as in the drifted map
-  EXPECT_EQ(gate.Offer(loop, {}, PlaceOf).loops.size(), 1u);
+  EXPECT_EQ(gate.Admit(loop, {}, PlaceOf).loops.size(), 1u);
 }
 
 TEST(LoopGate, WhatLoopsErrThemselvesIsNoContradiction) {
@@ -130,36 +130,36 @@ TEST(LoopGate, WhatLoopsErrThemselvesIsNoContradiction) {
 
 TEST(LoopGate, AcceptedLoopsVouchForLaterOnes) {
   Gate gate{SlamOptions()};
-  EXPECT_EQ(gate.Offer(LoopTo(13), {LoopTo(10)}, PlaceOf).loops.size(), 1u);
+  EXPECT_EQ(gate.Admit(LoopTo(13), {LoopTo(10)}, PlaceOf).loops.size(), 1u);
 }
 
 TEST(LoopGate, ScaleMustAgreeToo) {
   Gate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
   LoopEdge other = LoopTo(11);
   other.S_candidate_query.scale = 1.5;
-  EXPECT_TRUE(gate.Offer(other, {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(other, {}, PlaceOf).loops.empty());
 }
 
 TEST(LoopGate, DrivesAtDifferentTimesVouchForEachOtherOnlyAcrossThem) {
   for (const bool across : {false, true}) {
     Gate gate{SlamOptions()};
-    EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
+    EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
     LoopEdge other = LoopTo(12);
     other.query_frame += 100000;  // of another recording, whose keyframes stand beside the first one's
-    EXPECT_EQ(gate.Offer(other, {}, PlaceOf, across).loops.size(), across ? 2u : 0u);
+    EXPECT_EQ(gate.Admit(other, {}, PlaceOf, across).loops.size(), across ? 2u : 0u);
   }
   Gate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
   LoopEdge far = LoopTo(30);  // 20 m on, 10 m deep
   far.query_frame += 100000;
-  EXPECT_TRUE(gate.Offer(far, {}, PlaceOf, true).loops.empty());
+  EXPECT_TRUE(gate.Admit(far, {}, PlaceOf, true).loops.empty());
 }
 
 TEST(LoopGate, TheSameTwoKeyframesAgainAreNoSecondLoop) {
   Gate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
-  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
 }
 
 // A hand that shakes, and rows that are read one after the other.
@@ -167,14 +167,14 @@ TEST(LoopGate, ThreeThatAgreeRoughlyEnterWhereTwoMustAgreeClosely) {
   LoopEdge beside = LoopTo(14);
   beside.S_candidate_query.translation = {0.15, 0.26, 0};
   Gate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).loops.empty());
-  EXPECT_TRUE(gate.Offer(LoopTo(12, 0.3), {}, PlaceOf).loops.empty()) << "0.2 m is the limit";
-  EXPECT_EQ(gate.Offer(beside, {}, PlaceOf).loops.size(), 3u) << "0.3 m from both";
+  EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf).loops.empty());
+  EXPECT_TRUE(gate.Admit(LoopTo(12, 0.3), {}, PlaceOf).loops.empty()) << "0.2 m is the limit";
+  EXPECT_EQ(gate.Admit(beside, {}, PlaceOf).loops.size(), 3u) << "0.3 m from both";
   EXPECT_TRUE(gate.waiting().empty());
 
   Gate apart{SlamOptions()};
   for (const double error : {0.0, 0.5, 1.0, 1.5}) {
-    EXPECT_TRUE(apart.Offer(LoopTo(10 + static_cast<int>(4 * error), error), {}, PlaceOf).loops.empty());
+    EXPECT_TRUE(apart.Admit(LoopTo(10 + static_cast<int>(4 * error), error), {}, PlaceOf).loops.empty());
   }
 }
 
@@ -183,11 +183,11 @@ TEST(LoopGate, LoopsThatAreDoubtfulDoNotVouchForEachOther) {
   Gate gate{SlamOptions()};
   const auto weak = [](const LoopEdge&) { return LoopGate::Trust::kWeak; };
   for (const int k : {10, 15, 20, 25}) {
-    EXPECT_TRUE(gate.Offer(LoopTo(k), {}, PlaceOf, false, weak).loops.empty()) << k;
+    EXPECT_TRUE(gate.Admit(LoopTo(k), {}, PlaceOf, false, weak).loops.empty()) << k;
   }
   SlamOptions alone;
   alone.loop_confirmations = 1;
-  EXPECT_TRUE(Gate(alone).Offer(LoopTo(10), {}, PlaceOf, false, weak).loops.empty());
+  EXPECT_TRUE(Gate(alone).Admit(LoopTo(10), {}, PlaceOf, false, weak).loops.empty());
 }
 
 TEST(LoopGate, ADoubtfulLoopIsAWitnessForASureOneThatSawSomethingElse) {
@@ -198,8 +198,8 @@ TEST(LoopGate, ADoubtfulLoopIsAWitnessForASureOneThatSawSomethingElse) {
     for (const int apart : {2, 4}) {  // m, of a depth of 10
       Gate gate{SlamOptions()};
       const LoopEdge sure = LoopTo(20), doubtful = LoopTo(20 - apart);
-      EXPECT_TRUE(gate.Offer(doubtful_first ? doubtful : sure, {}, PlaceOf, false, weak).loops.empty());
-      const auto admitted = gate.Offer(doubtful_first ? sure : doubtful, {}, PlaceOf, false, weak);
+      EXPECT_TRUE(gate.Admit(doubtful_first ? doubtful : sure, {}, PlaceOf, false, weak).loops.empty());
+      const auto admitted = gate.Admit(doubtful_first ? sure : doubtful, {}, PlaceOf, false, weak);
       ASSERT_EQ(admitted.loops.size(), apart > 3 ? 2u : 0u) << "doubtful first: " << doubtful_first;
       if (apart > 3) {
         EXPECT_EQ(admitted.witness->candidate, (doubtful_first ? doubtful : sure).candidate);
@@ -213,12 +213,12 @@ TEST(LoopGate, ADoubtfulLoopMustAgreeAsAnyOther) {
   const auto weak = [](const LoopEdge& loop) {
     return loop.candidate < 20 ? LoopGate::Trust::kWeak : LoopGate::Trust::kSure;
   };
-  gate.Offer(LoopTo(20), {}, PlaceOf, false, weak);
-  EXPECT_TRUE(gate.Offer(LoopTo(15, 0.5), {}, PlaceOf, false, weak).loops.empty());
+  gate.Admit(LoopTo(20), {}, PlaceOf, false, weak);
+  EXPECT_TRUE(gate.Admit(LoopTo(15, 0.5), {}, PlaceOf, false, weak).loops.empty());
   LoopEdge turned = LoopTo(14);
   turned.S_candidate_query.rotation = ExpSO3({0, 0, 0.05});
-  EXPECT_TRUE(gate.Offer(turned, {}, PlaceOf, false, weak).loops.empty());
-  EXPECT_EQ(gate.Offer(LoopTo(13), {}, PlaceOf, false, weak).loops.size(), 2u);
+  EXPECT_TRUE(gate.Admit(turned, {}, PlaceOf, false, weak).loops.empty());
+  EXPECT_EQ(gate.Admit(LoopTo(13), {}, PlaceOf, false, weak).loops.size(), 2u);
 }
 
 // Where the odometry would have to have failed altogether.
@@ -226,9 +226,9 @@ TEST(LoopGate, LoopsThatAreFarFetchedEnterWithThreeThatSawDifferentThings) {
   const auto far = [](const LoopEdge&) { return LoopGate::Trust::kFar; };
   for (const int step : {2, 4}) {  // m, of a depth of 10
     Gate gate{SlamOptions()};
-    EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf, false, far).loops.empty());
-    EXPECT_TRUE(gate.Offer(LoopTo(10 + step), {}, PlaceOf, false, far).loops.empty());
-    EXPECT_EQ(gate.Offer(LoopTo(10 - step), {}, PlaceOf, false, far).loops.size(), step > 3 ? 3u : 0u)
+    EXPECT_TRUE(gate.Admit(LoopTo(10), {}, PlaceOf, false, far).loops.empty());
+    EXPECT_TRUE(gate.Admit(LoopTo(10 + step), {}, PlaceOf, false, far).loops.empty());
+    EXPECT_EQ(gate.Admit(LoopTo(10 - step), {}, PlaceOf, false, far).loops.size(), step > 3 ? 3u : 0u)
         << step;
   }
 }
@@ -248,8 +248,8 @@ TEST(LoopGate, ADoubtfulLoopThatTheMapSaysTooEntersAndTakesNoOtherAlong) {
   const auto weak = [](const LoopEdge&) { return LoopGate::Trust::kWeak; };
   LoopEdge in_map = LoopTo(14);
   in_map.S_candidate_query.translation = {5, 0, 0};  // as in the drifted map
-  gate.Offer(LoopTo(10), {}, PlaceOf, false, weak);
-  EXPECT_EQ(gate.Offer(in_map, {}, PlaceOf, false, weak).loops.size(), 1u);
+  gate.Admit(LoopTo(10), {}, PlaceOf, false, weak);
+  EXPECT_EQ(gate.Admit(in_map, {}, PlaceOf, false, weak).loops.size(), 1u);
   EXPECT_EQ(gate.waiting().size(), 1u);
 }
 
@@ -257,7 +257,7 @@ TEST(LoopGate, OneConfirmationTrustsEachLoopAlone) {
   SlamOptions options;
   options.loop_confirmations = 1;
   Gate gate{options};
-  EXPECT_EQ(gate.Offer(LoopTo(10), {}, PlaceOf).loops.size(), 1u);
+  EXPECT_EQ(gate.Admit(LoopTo(10), {}, PlaceOf).loops.size(), 1u);
 }
 
 }  // namespace

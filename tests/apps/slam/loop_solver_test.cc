@@ -105,7 +105,7 @@ TEST(Follow, KeepsWhatMappingFoundAndTakesNewKeyframesAlong) {
   now.push_back({3, 1, Pose(identity.rotation, {7, 7, 7})});  // in another piece
   KeyframeCorrection solved;
   solved.S_world_keyframe = {{0, Similarity(identity)}, {1, Similarity(1, identity.rotation, {1, 10, 0})}};
-  const std::map<int, Similarity> moved = Follow(solved, then, now);
+  const std::map<int, Similarity> moved = MovedAsSolved(solved, then, now);
   EXPECT_EQ(moved.at(0).translation, Eigen::Vector3d(0, 0, 0));
   EXPECT_LT((moved.at(1).translation - Eigen::Vector3d(1, 10.25, 0)).norm(), 1e-12);
   EXPECT_LT((moved.at(2).translation - Eigen::Vector3d(2, 10, 0)).norm(), 1e-12);

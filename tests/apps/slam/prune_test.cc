@@ -92,6 +92,15 @@ void ExpectOnePiece(const SlamSystem& slam) {
   EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->map().KeyframeIds().size());
 }
 
+// What loops.csv says of them; their edges go over to keyframes that stay.
+std::string RecordsOf(std::vector<Loop> loops) {
+  for (Loop& loop : loops) {
+    loop.edge = LoopEdge();
+    loop.untied = false;
+  }
+  return StateOf(loops);
+}
+
 class Pruned : public ::testing::TestWithParam<SyntheticSensor> {};
 
 // One test, for the sake of its time: two laps are mapped and pruned.
@@ -102,7 +111,7 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
   for (std::size_t i = 0; i < mapped; ++i) slam.Track(recording.frames[i]);
   slam.Finish();
   const Trajectory trajectory = FrameTrajectory(slam.odometry()->map());
-  const std::string loops = StateOf(slam.loops());
+  const std::string loops = RecordsOf(slam.loops());
   const std::size_t accepted = CountAccepted(slam.loops());
   const std::vector<int> before = slam.odometry()->map().KeyframeIds();
   ASSERT_GT(accepted, 0u);
@@ -115,7 +124,7 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
   EXPECT_EQ(ids.front(), before.front());
   EXPECT_TRUE(std::includes(before.begin(), before.end(), ids.begin(), ids.end())) << "ids stay";
   EXPECT_LT(FarthestApart(FrameTrajectory(slam.odometry()->map()), trajectory), 1e-9);
-  EXPECT_EQ(StateOf(slam.loops()) == loops, true) << "records stay";
+  EXPECT_EQ(RecordsOf(slam.loops()) == loops, true) << "records stay";
   EXPECT_EQ(slam.Graph().nodes().size(), ids.size());
   EXPECT_EQ(Connected(slam.Graph()), ids.size());
 

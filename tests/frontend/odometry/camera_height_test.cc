@@ -121,7 +121,7 @@ TEST(CameraHeight, BelievesALoop) {
   CameraHeight height;
   DriveOn(0.0005, false, &height);
   const auto before = height.Drift();
-  height.Follow(0.9);
+  height.Rescale(0.9);
   EXPECT_EQ(height.Drift(), before) << "the map is right where a loop has moved it";
 }
 

@@ -15,6 +15,7 @@
 #define TUTTI_UNDER_TSAN 0
 #endif
 
+#pragma GCC visibility push(default)
 namespace tutti {
 namespace internal {
 
@@ -74,3 +75,4 @@ class SharedVector {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

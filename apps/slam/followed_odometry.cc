@@ -15,7 +15,7 @@ OdometryUncertainty::Sigmas Larger(const OdometryUncertainty::Sigmas& a,
   return {std::max(a.fraction, b.fraction), std::max(a.rotation_rad, b.rotation_rad)};
 }
 
-// Of a contradiction, what that much does not explain.
+// The part of a contradiction that so much does not explain.
 double Beyond(const Eigen::Vector3d& contradiction, double explained) {
   return std::sqrt(std::max(0.0, contradiction.squaredNorm() - explained * explained));
 }

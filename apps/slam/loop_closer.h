@@ -174,7 +174,7 @@ class LoopCloser {
             c.keyframe_of_frame_, c.stamps_, c.keyframes_seen_, c.warnings_, c.last_warning_, c.stages_,
             c.session_);
   }
-  /// Of what was loaded. Throws InputError where it names a keyframe from `end` on.
+  /// Throws InputError where a state that was loaded names a keyframe from `end` on.
   void Check(int end, const internal::SectionReader& file) const;
 
   SpanRecorder* recorder_;

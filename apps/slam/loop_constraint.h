@@ -38,8 +38,8 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
                                   const KeyframeView& query, const CameraRig& rig,
                                   const LoopDetectorOptions& detector);
 
-/// The same with candidate and query exchanged: what another detector found, which knew the newer keyframe.
-/// `candidate`: id of what is the candidate then.
+/// The verification with candidate and query exchanged: what another detector found, which knew the newer
+/// keyframe. `candidate`: id of what is the candidate then.
 Verification Reversed(const Verification& verification, std::int64_t candidate);
 
 /// Median z of the keyframe's points; 0 if it has none.

@@ -25,7 +25,7 @@ double Step(int a, int b, const Map& map) {
   return (map.keyframe(a).T_world_camera.translation - map.keyframe(b).T_world_camera.translation).norm();
 }
 
-// Of two keyframes of one piece.
+// The two keyframes are of one submap.
 double WayBetween(int from, int to, const Map& map) {
   const auto [first, last] = std::minmax(from, to);
   const std::vector<int> ids = KeyframesOfPiece(map.keyframe(from).piece, map);
@@ -67,7 +67,7 @@ std::optional<Gap> ShortestGap(const LoopEdge& loop, const Map& map) {
   return gap;
 }
 
-// As fast as the camera was in its faster moments [map units/s]; 0: not known.
+// The speed of the camera in its faster moments [map units/s]; 0: not known.
 double FastSpeed(int piece, const Map& map) {
   constexpr double kFaster = 0.9;  // quantile
   const std::vector<int> ids = KeyframesOfPiece(piece, map);

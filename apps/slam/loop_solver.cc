@@ -10,8 +10,9 @@
 namespace tutti {
 namespace {
 
-// Of a loop's weight, after optimisation. A true loop has all of it: what it disagreed by was drift, which
-// the map has taken up. A false one that the map could be bent to keeps the part that Huber's loss leaves it.
+// The share of its weight that a loop has left after optimisation. A true loop has all of it: what it
+// disagreed by was drift, which the map has taken up. A false one that the map could be bent to keeps the
+// part that Huber's loss leaves it.
 constexpr double kLeastWeight = 0.5;
 
 std::string BeyondGate(double sigmas, double limit) {
@@ -43,7 +44,7 @@ void Gate(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
   }
 }
 
-// Of a loop after the optimisation.
+// How far a loop is from the optimised map.
 Disagreement Residual(const LoopEdge& loop, const std::map<int, Similarity>& poses) {
   const Similarity &c = poses.at(loop.candidate), &q = poses.at(loop.query);
   const Similarity E = loop.S_candidate_query * q.Inverse() * c;  // in the candidate's units, as depth is

@@ -60,7 +60,7 @@ std::map<int, Similarity> MovedAsSolved(const KeyframeCorrection& solved,
 /// (docs/backend.md), so that nobody waits for it.
 std::int64_t SolutionFrames(std::size_t keyframes);
 
-/// The same beside the tracking, one at a time.
+/// Solves beside the tracking, one at a time.
 class BackgroundLoopSolver {
  public:
   BackgroundLoopSolver() = default;

@@ -58,7 +58,7 @@ void MapMerge::Append() {
   AppendLoops();
 }
 
-// Of the other map's loops those count that are in it.
+// The other map's loops count if they are in that map.
 void MapMerge::AppendLoops() {
   LoopCloser& loops = map_.loops;
   const LoopCloser& others = other_.loops;

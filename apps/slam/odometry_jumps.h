@@ -26,7 +26,7 @@ Trajectory OnlyInliers(const Trajectory& trajectory, const std::vector<OdometryJ
 /// "the odometry jumps by ..."
 std::string Sentence(const OdometryJump& jump);
 
-/// The same while poses come in: a jump is told some 20 poses later.
+/// Finds jumps while poses come in: a jump is told some 20 poses later.
 class JumpWatch {
  public:
   void Add(const StampedPose& pose) { recent_.push_back(pose); }

@@ -15,7 +15,7 @@ class SessionList {
  public:
   SessionList() : sessions_(1) {}
 
-  /// Of the present one: added to its frames' numbers.
+  /// What is added to the numbers of the present one's frames.
   std::int64_t offset() const { return sessions_.back().frame_offset; }
   std::size_t size() const { return sessions_.size(); }
   /// The offset of a session that begins now: past every number that there is.
@@ -25,7 +25,7 @@ class SessionList {
   /// Those of another map, whose frames and submaps have numbers from these on.
   void Append(const SessionList& other, std::int64_t frame_offset, int first_piece);
 
-  /// Of the present one.
+  /// How many frames the present one has.
   std::int64_t frames() const { return sessions_.back().frames; }
   void CountFrame() { ++sessions_.back().frames; }
   void SetLastFrame(std::int64_t index) { sessions_.back().last_frame = index; }

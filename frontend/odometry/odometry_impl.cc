@@ -84,7 +84,7 @@ Tracker::Tracked Odometry::Impl::Look(const TrackedFrame& frame) {
   return rolling_start_.Is(last()) ? LookFromStart(frame) : tracker_.Track(frame, map());
 }
 
-// Of the second frame of a piece, which tells how the camera moved in the first.
+// The second frame of a submap tells how the camera moved in the first.
 Tracker::Tracked Odometry::Impl::LookFromStart(const TrackedFrame& frame) {
   EnterMapping();
   const Tracker start = tracker_;

@@ -73,7 +73,7 @@ class LandmarkStore {
  public:
   int size() const { return size_; }
 
-  /// Of one that Compact took away: an empty one, which is not alive.
+  /// An empty one, which is not alive, in place of one that Compact took away.
   const Landmark& operator[](int id) const {
     const Chunk& chunk = *chunks_[ChunkOf(id)];
     const int at = chunk.at[PlaceOf(id)];

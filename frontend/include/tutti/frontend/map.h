@@ -68,7 +68,7 @@ class Map {
 
   /// All ids are below it; those of removed keyframes are, too.
   int KeyframeCount() const { return static_cast<int>(keyframes_.size()); }
-  /// The same of landmarks that are gone.
+  /// All ids are below it; those of landmarks that are gone are, too.
   int LandmarkCount() const { return landmarks_.size(); }
   /// Ids of all keyframes that are in the map, ascending.
   std::vector<int> KeyframeIds() const;
@@ -123,7 +123,7 @@ class Map {
   void UpdateLandmark(int landmark);
   /// Viewing direction and distances alone, after keyframes or the landmark have moved.
   void UpdateGeometry(int landmark);
-  /// The same for all landmarks.
+  /// Viewing direction and distances of all landmarks.
   void UpdateGeometry();
   /// A frame has this pose, and hangs on this keyframe.
   void AddFrame(std::int64_t index, double stamp_s, int keyframe, const Pose& T_camera_world);

@@ -174,7 +174,7 @@ class Odometry {
   /// Returns what Track did if that fails, or if there is no such frame.
   TrackResult RelocalizeAt(int keyframe);
 
-  /// As it is between two frames; mapping may be under way.
+  /// The map between two frames; mapping may be under way.
   const Map& map() const;
 
   /// A new keyframe is mapped (landmarks, local bundle adjustment) beside the tracking of the next frames;

@@ -52,9 +52,9 @@ struct ReliabilityBin {
 
 /// Recall over some of the images with a loop, by the earlier view that shares most with each.
 struct RecallPart {
-  double from =
-      0;  ///< of the images whose best view has from <= overlap (to: 1), or from <= angle < to [deg]
-  double to = 0;
+  /// The images whose best view has from <= overlap (to: 1), or from <= angle < to [deg].
+  double from = 0;
+  double to = 0;                   ///< see `from`
   int rows = 0;                    ///< so many images
   int found = 0;                   ///< of these: the right place was said, at the default threshold
   int found_at_100_precision = 0;  ///< of these: before the first false positive

@@ -53,7 +53,7 @@ class System {
     return localizer_ ? localizer_->Relocalized() : slam_->Report().relocalized;
   }
   std::vector<std::string> TakeWarnings() { return slam_->TakeWarnings(); }
-  std::map<std::string, double> StageMilliseconds() const { return slam_->Report().stage_ms; }
+  std::map<std::string, double> StageMilliseconds() const { return tutti::StageMilliseconds(*slam_); }
 
  private:
   void CheckMaps() const {
@@ -268,7 +268,7 @@ void BindSlamSystem(py::module_& module) {
       .def_property_readonly("corrections", Locked(&System::Corrections), doc::SlamReport_corrections)
       .def_property_readonly("relocalized", Locked(&System::Relocalized), doc::SlamReport_relocalized)
       .def("take_warnings", Locked(&System::TakeWarnings), doc::SlamSystem_TakeWarnings)
-      .def_property_readonly("stage_ms", Locked(&System::StageMilliseconds), doc::SlamReport_stage_ms);
+      .def_property_readonly("stage_ms", Locked(&System::StageMilliseconds), doc::StageMilliseconds);
 }
 
 }  // namespace tutti::python

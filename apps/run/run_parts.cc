@@ -161,10 +161,11 @@ void CollectMap(const RunState& state, RunResult& result) {
         BodyTrajectory(FrameTrajectory(odometry.map(), pieces[i], session), result.rig));
   result.in_map = !pieces.empty() && pieces.front() < odometry.LastView().session_piece;
   result.trajectory_odometry = result.trajectory;
-  result.stereo_row_error_px = odometry.Report().stereo_row_error_px;
-  result.stereo_matches = odometry.Report().stereo_matches;
-  result.lens = odometry.Report().lens;
-  result.height = odometry.Report().height;
+  const OdometryReport report = odometry.Report();
+  result.stereo_row_error_px = report.stereo_row_error_px;
+  result.stereo_matches = report.stereo_matches;
+  result.lens = report.lens;
+  result.height = report.height;
   result.map_figures = MeasureMap(odometry, session);
   CollectKeyframes(odometry, session, result);
 }

@@ -123,7 +123,7 @@ void SlamRun::Count() {
   result_.frames_listed = dataset_.Size();
   result_.skipped_share = dataset_.SkippedShare();
   result_.frame_interval_s = FrameInterval(dataset_);
-  result_.stage_ms = slam_->Report().stage_ms;
+  result_.stage_ms = StageMilliseconds(*slam_);
   result_.stage_ms["read"] = so_far_.read_ms;
   result_.stage_ms["read_wait"] = so_far_.read_wait_ms;
   if (slam_->odometry() != nullptr) result_.stage_ms["odometry_extract"] += so_far_.extract_ms;
@@ -151,9 +151,10 @@ void SlamRun::Collect() {
     CollectStamps(State(), result_);
     NoteJoining(result_.map->sessions.back());
   }
-  result_.global_adjustments = slam_->Report().global_adjustments;
+  const SlamReport report = slam_->Report();
+  result_.global_adjustments = report.global_adjustments;
   result_.graph = slam_->Graph();
-  result_.graph_proof = slam_->Report().graph_proof;
+  result_.graph_proof = report.graph_proof;
   if (given_ != nullptr && slam_->odometry() != nullptr) {  // every pose of it, as the keyframes are now
     Trajectory before;
     for (const StampedPose& keyframe : result_.keyframe_trajectory)
@@ -164,7 +165,7 @@ void SlamRun::Collect() {
   }
   const FrameRange session = State().Session();
   result_.given_odometry = given_ != nullptr;
-  result_.followed = slam_->Report().followed;
+  result_.followed = report.followed;
   if (given_ != nullptr) {
     std::vector<OdometryJump>& jumps = result_.followed.jumps;
     std::copy_if(given_->jumps().begin(), given_->jumps().end(), std::back_inserter(jumps),
@@ -404,7 +405,7 @@ void SlamRun::GoOnIn(const std::filesystem::path& map) {
 }
 
 std::size_t SlamRun::LoopsBefore() const {
-  const std::int64_t first = FirstFrame();
+  const std::int64_t first = slam_->Sessions().back().frame_offset;
   return static_cast<std::size_t>(std::count_if(slam_->loops().begin(), slam_->loops().end(),
                                                 [&](const Loop& l) { return l.query < first; }));
 }

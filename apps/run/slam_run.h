@@ -98,9 +98,7 @@ class SlamRun {
     return {slam_->odometry(), slam_->loops(), slam_->Report().corrections, recognised_, session_offsets_};
   }
   // In the map's numbers.
-  std::int64_t FirstFrame() const {
-    return slam_->odometry() == nullptr ? 0 : slam_->odometry()->LastView().frame_offset;
-  }
+  std::int64_t FirstFrame() const { return session_offsets_.back(); }
   std::FILE* Out() const { return request_.quiet ? nullptr : internal::StandardError(); }
   SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
   // Frames that are there by now, of those that the run may see.

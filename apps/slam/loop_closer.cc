@@ -1,6 +1,7 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "apps/slam/odometry_jumps.h"
@@ -115,6 +116,50 @@ int LoopCloser::Locate(const InputFrame& frame) {
 int LoopCloser::KeyframeOf(std::int64_t frame) const {
   const auto keyframe = keyframe_of_frame_.find(frame);
   return keyframe != keyframe_of_frame_.end() ? keyframe->second : -1;
+}
+
+void LoopCloser::Follow(const TrackResult& result, const StampedPose& T_odom_camera,
+                        const std::optional<MotionSigma>& sigma, const Odometry& odometry) {
+  if (result.step) {
+    if (const auto step = followed_.NoteStep(result.keyframe, *result.step))
+      graph_.NoteMotion(result.keyframe, *step);
+  }
+  followed_.Add(T_odom_camera);
+  JudgeJumps(odometry.map(), false);
+  if (!sigma) return;
+  const bool said_nothing = followed_.motions() == 0;
+  if (const auto motion = followed_.NoteMotion(result.keyframe, *sigma, T_odom_camera.pose.translation))
+    graph_.NoteMotion(result.keyframe, *motion);
+  if (said_nothing && followed_.motions() > 0) SetSigmas();  // what is configured no longer counts
+}
+
+// Marks jumps of the odometry in the graph, those up to the last pose as well if there are `all`.
+void LoopCloser::JudgeJumps(const Map& map, bool all) {
+  const std::vector<OdometryJump> jumps = followed_.TakeJumps(all);
+  if (jumps.empty()) return;
+  const std::vector<int> ids = map.KeyframeIds();
+  const auto later = [&](double stamp_s) {
+    return std::partition_point(ids.begin(), ids.end(),
+                                [&](int id) { return map.keyframe(id).stamp_s < stamp_s; });
+  };
+  for (const OdometryJump& jump : jumps) {
+    const auto end = later(jump.to_s);
+    const int next = end == ids.end() ? map.KeyframeCount() : *end;
+    if (!jump.comes_back) {
+      if (followed_.ImagesConfirm(next, jump)) continue;
+      graph_.NoteJump(next);
+    }
+    followed_.NoteJump(jump);
+    if (!jump.comes_back) continue;
+    for (auto outlier = later(std::nextafter(jump.from_s, jump.to_s)); outlier != end; ++outlier)
+      graph_.NoteOutlier(*outlier);
+  }
+}
+
+void LoopCloser::SetSigmas() {
+  constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
+  const FollowedOdometry::Sigmas least = followed_.Least();
+  graph_.SetSigmas(least.fraction, std::max(least.rotation_rad, kLeastRotation_rad));
 }
 
 void LoopCloser::Due(Odometry* odometry, std::int64_t frames) {

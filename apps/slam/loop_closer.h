@@ -196,7 +196,8 @@ class LoopCloser {
   std::vector<std::int64_t> sessions_;  // those of recordings but the first, ascending
 
   std::vector<Loop> loops_;
-  std::int64_t changes_ = 0;  // of their states
+  std::int64_t changes_ = 0;             // of their states
+  std::int64_t none_agreed_since_ = -1;  // value of changes_: no need to look at all of them in each frame
   FollowedOdometry followed_;
   LoopGate gate_;
   KeyframeGraph graph_;

@@ -1,6 +1,5 @@
 // Which loops enter the pose graph, and how the map moves then: the decisions of LoopCloser.
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 
@@ -278,8 +277,11 @@ bool LoopCloser::MayMove(std::int64_t frames) const {
 std::optional<LoopCloser::Update> LoopCloser::Solved(const Odometry& odometry, std::int64_t frames,
                                                      Entering entering) {
   if (!solver_.Running()) {
+    if (none_agreed_since_ == changes_) return std::nullopt;
     const std::vector<std::size_t> agreed = InState(LoopState::kAgreed);
-    return agreed.empty() ? std::nullopt : std::optional(Enter(agreed, odometry, frames));
+    if (!agreed.empty()) return Enter(agreed, odometry, frames);
+    none_agreed_since_ = changes_;
+    return std::nullopt;
   }
   if (entering == Entering::kWhenDue && frames < solved_due_) return std::nullopt;
   const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_correction");
@@ -424,50 +426,6 @@ void LoopCloser::Withdraw(std::int64_t query_frame, const std::string& reason, b
     loop.verified = false;
     loop.reason = reason;
   }
-}
-
-void LoopCloser::Follow(const TrackResult& result, const StampedPose& T_odom_camera,
-                        const std::optional<MotionSigma>& sigma, const Odometry& odometry) {
-  if (result.step) {
-    if (const auto step = followed_.NoteStep(result.keyframe, *result.step))
-      graph_.NoteMotion(result.keyframe, *step);
-  }
-  followed_.Add(T_odom_camera);
-  JudgeJumps(odometry.map(), false);
-  if (!sigma) return;
-  const bool said_nothing = followed_.motions() == 0;
-  if (const auto motion = followed_.NoteMotion(result.keyframe, *sigma, T_odom_camera.pose.translation))
-    graph_.NoteMotion(result.keyframe, *motion);
-  if (said_nothing && followed_.motions() > 0) SetSigmas();  // what is configured no longer counts
-}
-
-// Marks jumps of the odometry in the graph, those up to the last pose as well if there are `all`.
-void LoopCloser::JudgeJumps(const Map& map, bool all) {
-  const std::vector<OdometryJump> jumps = followed_.TakeJumps(all);
-  if (jumps.empty()) return;
-  const std::vector<int> ids = map.KeyframeIds();
-  const auto later = [&](double stamp_s) {
-    return std::partition_point(ids.begin(), ids.end(),
-                                [&](int id) { return map.keyframe(id).stamp_s < stamp_s; });
-  };
-  for (const OdometryJump& jump : jumps) {
-    const auto end = later(jump.to_s);
-    const int next = end == ids.end() ? map.KeyframeCount() : *end;
-    if (!jump.comes_back) {
-      if (followed_.ImagesConfirm(next, jump)) continue;
-      graph_.NoteJump(next);
-    }
-    followed_.NoteJump(jump);
-    if (!jump.comes_back) continue;
-    for (auto outlier = later(std::nextafter(jump.from_s, jump.to_s)); outlier != end; ++outlier)
-      graph_.NoteOutlier(*outlier);
-  }
-}
-
-void LoopCloser::SetSigmas() {
-  constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
-  const FollowedOdometry::Sigmas least = followed_.Least();
-  graph_.SetSigmas(least.fraction, std::max(least.rotation_rad, kLeastRotation_rad));
 }
 
 void LoopCloser::Check(int end, const internal::SectionReader& file) const {

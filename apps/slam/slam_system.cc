@@ -195,9 +195,6 @@ class SlamSystem::Impl {
     SlamReport report = loops_.Report();
     report.relocalized = relocalized_;
     for (const auto& [name, ms] : stages_) report.stage_ms[name] += ms;
-    if (odometry_) {
-      for (const auto& [name, ms] : odometry_->Report().stage_ms) report.stage_ms["odometry_" + name] = ms;
-    }
     return report;
   }
 
@@ -388,6 +385,13 @@ PoseGraph SlamSystem::Graph() const {
 }
 SlamReport SlamSystem::Report() const { return impl_->Report(); }
 MapSnapshot SlamSystem::Snapshot(const std::string& note) const { return impl_->Snapshot(note); }
+
+std::map<std::string, double> StageMilliseconds(const SlamSystem& slam) {
+  std::map<std::string, double> stages = slam.Report().stage_ms;
+  if (slam.odometry() == nullptr) return stages;
+  for (const auto& [name, ms] : slam.odometry()->Report().stage_ms) stages["odometry_" + name] = ms;
+  return stages;
+}
 
 std::unique_ptr<SlamSystem> LoadMap(const std::filesystem::path& file, const MapInfo& info,
                                     SpanRecorder* recorder,

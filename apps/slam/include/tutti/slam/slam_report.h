@@ -38,7 +38,7 @@ struct SlamReport {
   /// With graph.certify, of the last solution of the pose graph that moved the map: where each start leads,
   /// and whether the best of them is the global optimum.
   std::optional<KeyframeGraphProof> graph_proof;
-  /// Milliseconds spent, summed, by stage; the detector's run beside the odometry's.
+  /// Milliseconds spent, summed, by stage, without the odometry's (StageMilliseconds).
   std::map<std::string, double> stage_ms;
 };
 

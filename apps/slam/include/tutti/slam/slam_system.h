@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -114,6 +115,10 @@ class SlamSystem {
   explicit SlamSystem(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+/// Milliseconds spent, summed, by stage: SlamReport::stage_ms, and the odometry's as "odometry_...". The
+/// detector's run beside the odometry's.
+std::map<std::string, double> StageMilliseconds(const SlamSystem& slam);
 
 /// Goes on from a file that Snapshot().Write wrote exactly as the saved one would have gone on, whose
 /// listeners are to be set again. `info`: ReadMapInfo(file); its config.run.threads may be another. `more`

@@ -351,6 +351,8 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       "number 200");
   without_number("0.03", "--readout", w.readout_s,
                  "rolling shutter: the last row is read so long after the first [s]; without a number 0.03");
+  AddDefaulted(c, "--depth-delay", w.depth_delay_s,
+               "rgbd: depth images are taken so long before the colour images they come with [s]");
   c.add_flag("--lighting-change", w.lighting_change, "another sun, darker, from the second lap on");
   c.add_flag("--dusk", w.dusk,
              "from the second lap on: dark, noisy, sun from elsewhere; town: lamps are lit");

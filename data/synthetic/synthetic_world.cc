@@ -47,6 +47,7 @@ std::string SyntheticOptions::Validate() const {
   if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "noise_sigma must be 0 to 100 grey levels";
   if (!(motion_blur_s >= 0 && motion_blur_s <= 0.1)) return "motion_blur_s must be 0 to 0.1 s";
   if (!(readout_s >= 0 && readout_s <= 0.1)) return "readout_s must be 0 to 0.1 s";
+  if (!(std::abs(depth_delay_s) <= 0.1)) return "depth_delay_s must be -0.1 to 0.1 s";
   if (!(shake_deg_per_s >= 0 && shake_deg_per_s <= 400)) return "shake_deg_per_s must be 0 to 400 deg/s";
   if (!(occlusion >= 0 && occlusion <= 0.3)) return "occlusion must be 0 to 0.3 of the image";
   if ((occlusion > 0 || other_cars) && scene != SyntheticScene::kTown)
@@ -316,6 +317,10 @@ struct SyntheticWorld::Impl {
     if (!right.empty()) frame.right = Sense(right, 2 * i + 1, dusk);
     if (options.sensor == SyntheticSensor::kRgbd) {
       frame.depth_m = left.depth_m;
+      if (options.readout_s > 0 || options.depth_delay_s != 0) {  // it has a shutter of its own, a global one
+        const double taken = std::max(0.0, frame.stamp_s - options.depth_delay_s);
+        frame.depth_m = ViewFrom(camera, CameraAt(taken), taken, 0).depth_m;
+      }
       if (options.kinect_noise) DepthNoise(frame.depth_m, i);
       const float limit =
           static_cast<float>(std::min(options.max_depth_m, 65535.0 / options.depth_units_per_m));

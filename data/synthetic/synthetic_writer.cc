@@ -150,6 +150,8 @@ std::string ConfigText(const SyntheticWorld& world) {
     out << "  baseline_m: " << o.baseline_m << "  # the right camera lies so far to the right [m]\n";
   if (o.readout_s > 0)
     out << "  readout_s: " << o.readout_s << "  # the last row is read so long after the first [s]\n";
+  if (o.depth_delay_s != 0)
+    out << "  depth_delay_s: " << o.depth_delay_s << "  # depth is taken so long before its time stamp [s]\n";
   return out.str();
 }
 

@@ -46,7 +46,7 @@ InputFrame MakeFrame(const py::object& image, double stamp, std::int64_t index, 
 }
 
 CameraRig MakeRig(const PinholeCamera& camera, const std::string& sensor, double baseline_m, double rate_hz,
-                  double max_depth_m, double readout_s) {
+                  double max_depth_m, double readout_s, double depth_delay_s) {
   CameraRig rig;
   rig.camera = camera;
   bool known = false;
@@ -62,6 +62,7 @@ CameraRig MakeRig(const PinholeCamera& camera, const std::string& sensor, double
   rig.rate_hz = rate_hz;
   rig.max_depth_m = max_depth_m;
   rig.readout_s = readout_s;
+  rig.depth_delay_s = depth_delay_s;
   return rig;
 }
 
@@ -187,6 +188,7 @@ void BindRig(py::module_& module) {
       .def(py::init(&MakeRig), "camera"_a, "sensor"_a = WordOf(defaults.sensor), py::kw_only(),
            "baseline_m"_a = defaults.baseline_m, "rate_hz"_a = defaults.rate_hz,
            "max_depth_m"_a = defaults.max_depth_m, "readout_s"_a = defaults.readout_s,
+           "depth_delay_s"_a = defaults.depth_delay_s,
            "sensor: mono, stereo or rgbd. The camera is that of rectified images.")
       .def_property_readonly(
           "sensor", [](const CameraRig& rig) { return WordOf(rig.sensor); }, "mono, stereo or rgbd")
@@ -195,6 +197,7 @@ void BindRig(py::module_& module) {
       .def_readonly("rate_hz", &CameraRig::rate_hz, doc::CameraRig_rate_hz)
       .def_readonly("max_depth_m", &CameraRig::max_depth_m, doc::CameraRig_max_depth_m)
       .def_readonly("readout_s", &CameraRig::readout_s, doc::CameraRig_readout_s)
+      .def_readonly("depth_delay_s", &CameraRig::depth_delay_s, doc::CameraRig_depth_delay_s)
       .def_readonly("calibrated", &CameraRig::calibrated, doc::CameraRig_calibrated)
       .def_property_readonly(
           "T_body_camera", [](const CameraRig& rig) { return ArrayOf(rig.T_body_camera); },

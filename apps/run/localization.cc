@@ -49,7 +49,8 @@ DatasetOptions Reading(const LocalizationRequest& request, const MapInfo& info) 
 
 void CheckRig(const LocalizationRequest& request, const CameraRig& map, const CameraRig& data) {
   if (StateOf(map.camera) == StateOf(data.camera) && map.sensor == data.sensor &&
-      map.baseline_m == data.baseline_m && map.readout_s == data.readout_s)
+      map.baseline_m == data.baseline_m && map.readout_s == data.readout_s &&
+      map.depth_delay_s == data.depth_delay_s)
     return;
   char text[200];
   std::snprintf(text, sizeof text, "%s, %dx%d px, fx %.2f px in the map, %s, %dx%d px, fx %.2f px",

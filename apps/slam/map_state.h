@@ -23,7 +23,7 @@ namespace tutti {
 template <class Archive>
 void State(Archive& archive, CameraRig& rig) {
   archive(rig.sensor, rig.camera, rig.baseline_m, rig.T_body_camera, rig.rate_hz, rig.max_depth_m,
-          rig.readout_s, rig.calibrated);
+          rig.readout_s, rig.depth_delay_s, rig.calibrated);
 }
 
 template <class Archive>

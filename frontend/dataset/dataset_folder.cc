@@ -260,6 +260,8 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
     InputFrame frame;
     frame.index = Number(i);
     frame.stamp_s = files.stamp_s;
+    frame.clock_s = files.clock_s;
+    frame.depth_later_s = files.depth_later_s;
     result.error = Rectify(ReadGreyFile(files.image), files.image, rig_.left, frame.image);
     if (!result.error.empty()) return result;
     frame.mask = MaskOf(files.image);

@@ -37,7 +37,7 @@ class ShortPath {
 
 /// Files of one frame; empty paths where the sensor, or the folder, has none.
 struct FrameFiles {
-  double stamp_s = 0;
+  double stamp_s = 0, clock_s = 0, depth_later_s = 0;  ///< as InputFrame's
   ShortPath image, right, depth;
 };
 

@@ -34,6 +34,7 @@ class StrayDataset : public Dataset {
     if (options.sensor != Sensor::kRgbd) return;
     rig_.sensor = Sensor::kRgbd;
     rig_.max_depth_m = options.max_depth_m;
+    rig_.depth_delay_s = options.depth_delay_s;
     FindDepth(options, of_video.camera, size);
   }
 

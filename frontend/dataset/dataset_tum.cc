@@ -6,6 +6,7 @@
 
 #include "core/time_stamps.h"
 #include "frontend/dataset/dataset_folder.h"
+#include "frontend/dataset/regular_clock.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -114,6 +115,20 @@ std::vector<double> StampsOf(const std::vector<StampedFile>& files) {
   return stamps;
 }
 
+// What the clocks of colour and depth say of frames. `depth`: the stamp of each one's depth image, NaN: none.
+void SetClocks(std::vector<FrameFiles>& frames, const std::vector<double>& depth) {
+  std::vector<double> stamps, own;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    stamps.push_back(frames[i].stamp_s);
+    if (std::isfinite(depth[i]) && (own.empty() || depth[i] > own.back())) own.push_back(depth[i]);
+  }
+  const std::vector<double> clock = RegularTimes(stamps), depth_clock = RegularTimes(own);
+  for (std::size_t i = 0, k = 0; i < frames.size(); ++i) {
+    frames[i].clock_s = clock[i] - stamps[i];
+    if (k < own.size() && own[k] == depth[i]) frames[i].depth_later_s = depth_clock[k++] - clock[i];
+  }
+}
+
 void FromLists(const fs::path& folder, const TumLists& lists, const DatasetOptions& options,
                FolderContents& out) {
   const std::vector<StampedFile> colour =
@@ -126,17 +141,22 @@ void FromLists(const fs::path& folder, const TumLists& lists, const DatasetOptio
     match = AssociateStamps(StampsOf(colour), StampsOf(depth), options.max_association_s);
   }
   std::size_t alone = 0;
+  std::vector<double> depth_stamps(colour.size(), NAN);
   for (std::size_t i = 0; i < colour.size(); ++i) {
     FrameFiles frame;
     frame.stamp_s = colour[i].stamp_s;
     frame.image = colour[i].file;
-    if (match[i] >= 0)
-      frame.depth = depth[static_cast<std::size_t>(match[i])].file;
-    else
+    if (match[i] >= 0) {
+      const StampedFile& partner = depth[static_cast<std::size_t>(match[i])];
+      frame.depth = partner.file;
+      depth_stamps[i] = partner.stamp_s;
+    } else {
       ++alone;
+    }
     out.frames.push_back(std::move(frame));
   }
   if (options.sensor != Sensor::kRgbd) return;
+  SetClocks(out.frames, depth_stamps);
   const std::string limit = std::to_string(options.max_association_s) + " s";
   out.ReportAlone(folder / lists.depth, alone,
                   "no depth image is within " + limit + " of a colour image of " + lists.colour +

@@ -71,6 +71,7 @@ RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, con
   rig.sensor = options.sensor;
   rig.rate_hz = rate_hz;
   rig.max_depth_m = options.max_depth_m;
+  rig.depth_delay_s = options.depth_delay_s;
   rig.T_body_camera = calibration.T_body_left;
   if (stereo && options.right) {
     calibration.right = options.right;

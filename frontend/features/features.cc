@@ -114,6 +114,18 @@ int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
   return distance;
 }
 
+float DepthImage::InverseAt(int x, int y) const {
+  if (x < 1 || y < 1 || x + 1 >= metres.cols || y + 1 >= metres.rows) return 0;
+  const float z = metres.at<float>(y, x);
+  if (!(z > 0.05F) || (max_m > 0 && z > max_m)) return 0;
+  bool edge = false;
+  for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+    const float n = metres.at<float>(y + dy, x + dx);
+    edge |= n > 0 && std::abs(1 / n - 1 / z) > 6 * static_cast<float>(inverse_sigma);
+  }
+  return edge ? -1.0F / z : 1.0F / z;
+}
+
 void FrameFeatures::BuildGrid(int width, int height) {
   columns_ = width / kCell + 1;
   rows_ = height / kCell + 1;
@@ -151,6 +163,7 @@ std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features
   auto out = std::make_shared<FrameFeatures>(features);
   out->pyramid.reset();
   out->depth_grid.reset();
+  out->depth_image.reset();
   return out;
 }
 
@@ -220,48 +233,31 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
 
 namespace {
 
-// Inverse depth at a pixel [1/m]; 0 where it is not known, negative at an edge: there, what is seen may
-// belong to either side.
-float InverseDepthAt(const cv::Mat& depth_m, int x, int y, const CameraRig& rig,
-                     const OdometryOptions& options) {
-  if (x < 1 || y < 1 || x + 1 >= depth_m.cols || y + 1 >= depth_m.rows) return 0;
-  const float z = depth_m.at<float>(y, x);
-  if (!(z > 0.05F) || (rig.max_depth_m > 0 && z > rig.max_depth_m)) return 0;
-  bool edge = false;
-  for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-    const float n = depth_m.at<float>(y + dy, x + dx);
-    edge |= n > 0 && std::abs(1 / n - 1 / z) > 6 * static_cast<float>(options.rgbd_inverse_sigma);
-  }
-  return edge ? -1.0F / z : 1.0F / z;
-}
-
-void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const OdometryOptions& options,
-                       FrameFeatures* features) {
+void AddDepthFromImage(const DepthImage& depth, FrameFeatures* features) {
   for (std::size_t i = 0; i < features->size(); ++i) {
     const cv::Point2f& p = features->keypoints[i].pt;
     const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
-    const float inverse = InverseDepthAt(depth_m, x, y, rig, options);
+    const float inverse = depth.InverseAt(x, y);
     if (!(inverse > 0)) continue;
     features->inverse_depth[i] = inverse;
-    features->inverse_depth_sigma[i] = static_cast<float>(options.rgbd_inverse_sigma);
+    features->inverse_depth_sigma[i] = static_cast<float>(depth.inverse_sigma);
   }
 }
 
 // About 2000 elements: enough for any image that is aligned by them.
-std::shared_ptr<const DepthGrid> GridOf(const cv::Mat& depth_m, const cv::Mat& mask, const CameraRig& rig,
-                                        const OdometryOptions& options) {
+std::shared_ptr<const DepthGrid> GridOf(const DepthImage& depth, const cv::Mat& mask) {
   constexpr int kElements = 2000, kFinest = 8;  // [px]
   auto grid = std::make_shared<DepthGrid>();
-  const double area = double(depth_m.cols) * depth_m.rows;
+  const double area = double(depth.metres.cols) * depth.metres.rows;
   grid->step = std::max(kFinest, static_cast<int>(std::lround(std::sqrt(area / kElements))));
-  grid->columns = depth_m.cols / grid->step;
-  const int rows = depth_m.rows / grid->step;
+  grid->columns = depth.metres.cols / grid->step;
+  const int rows = depth.metres.rows / grid->step;
   if (rows < 1 || grid->columns < 1) return nullptr;
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < grid->columns; ++c) {
       const int x = grid->step / 2 + c * grid->step, y = grid->step / 2 + r * grid->step;
       const bool masked = !mask.empty() && mask.at<std::uint8_t>(y, x) == 0;
-      grid->inverse_depth.push_back(masked ? 0 : InverseDepthAt(depth_m, x, y, rig, options));
+      grid->inverse_depth.push_back(masked ? 0 : depth.InverseAt(x, y));
     }
   }
   return grid;
@@ -276,8 +272,14 @@ FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, con
   features.pyramid = shared;
   features.has_depth = !frame.depth_m.empty() || !frame.right.empty();
   if (!frame.depth_m.empty()) {
-    AddDepthFromImage(frame.depth_m, rig, options, &features);
-    features.depth_grid = GridOf(frame.depth_m, frame.mask, rig, options);
+    // Time stamps alone say too little of when depth was taken: those of a Kinect are 15 ms off.
+    const double later_s = rig.depth_delay_s != 0 ? frame.depth_later_s - rig.depth_delay_s : 0;
+    DepthImage depth{frame.depth_m, later_s, rig.max_depth_m, options.rgbd_inverse_sigma};
+    features.depth_later_s = frame.depth_later_s;
+    AddDepthFromImage(depth, &features);
+    features.depth_grid = GridOf(depth, frame.mask);
+    if (rig.readout_s > 0 || rig.depth_delay_s != 0)
+      features.depth_image = std::make_shared<const DepthImage>(std::move(depth));
   }
   if (!frame.right.empty()) {
     const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);

@@ -53,6 +53,18 @@ inline cv::Point2f LevelScale(const cv::Mat& whole, const cv::Mat& level) {
 /// Number of differing bits of two 256-bit descriptors.
 int HammingDistance(const std::uint8_t* a, const std::uint8_t* b);
 
+/// A depth image, and when it was taken.
+struct DepthImage {
+  cv::Mat metres;            ///< CV_32FC1 [m], 0 = no measurement
+  double later_s = 0;        ///< taken so long after the middle row of the colour image [s]
+  double max_m = 0;          ///< farther depth is not used; 0 = no limit
+  double inverse_sigma = 0;  ///< standard deviation of inverse depth [1/m]
+
+  /// Inverse depth at a pixel [1/m]; 0 where it is not known, negative at an edge: there, what is seen may
+  /// belong to either side.
+  float InverseAt(int x, int y) const;
+};
+
 /// Inverse depth of every step-th pixel.
 struct DepthGrid {
   int step = 1;                      ///< [px]; the first is in row and column step / 2
@@ -90,9 +102,13 @@ struct FrameFeatures {
   std::shared_ptr<const Pyramid> pyramid;  ///< of the (left) image; null where it is not needed any more
   /// RGB-D: the depth image in short, for ImageAligner; null where it is not needed any more.
   std::shared_ptr<const DepthGrid> depth_grid;
-  bool has_depth = false;   ///< the frame came with a depth or right image
-  double row_error_px = 0;  ///< stereo: median absolute row difference of the matches [px]
-  int stereo_matches = 0;   ///< stereo: features with a match in the right image
+  /// RGB-D, taken at another time than the rows of the image: until RollingShutter looks up where its
+  /// features were then; else null, as in saved maps.
+  std::shared_ptr<const DepthImage> depth_image;
+  double depth_later_s = 0;  ///< InputFrame::depth_later_s; 0 in saved maps
+  bool has_depth = false;    ///< the frame came with a depth or right image
+  double row_error_px = 0;   ///< stereo: median absolute row difference of the matches [px]
+  int stereo_matches = 0;    ///< stereo: features with a match in the right image
 
   /// Indices of the features within `radius` [px] of `centre`, in octaves first..last, cell by
   /// cell of the grid.

@@ -1,19 +1,78 @@
 #include "frontend/geometry/rolling_shutter.h"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 namespace tutti {
 namespace {
 
 constexpr internal::GaussNewtonLimits kShutterLimits{10, 1e-7, 1e-5, 0};
+constexpr int kDepthRounds = 2;             // of looking up where a pixel was when depth was taken
+constexpr double kDepthTimeSigma = 0.0025;  // of the time when a depth image was taken [s]
 
 }  // namespace
+
+double RollingShutter::InverseDepth(const DepthImage& depth, const Eigen::Vector3d& ray, double first_m,
+                                    const Pose& T_taken_row) const {
+  const Pose T_row_taken = T_taken_row.Inverse();
+  double z = first_m, sign = 1;
+  for (int round = 0; round < kDepthRounds; ++round) {
+    const Eigen::Vector3d then = T_taken_row * (ray * z);
+    if (!(then.z() > kMinDepth)) return 0;
+    const Eigen::Vector2d pixel = camera_.Project(then);
+    if (!(pixel.x() > 0 && pixel.y() > 0 && pixel.x() < camera_.width && pixel.y() < camera_.height))
+      return 0;
+    const double inverse = double(
+        depth.InverseAt(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))));
+    if (inverse == 0) return 0;
+    sign = inverse < 0 ? -1 : 1;
+    z = (T_row_taken * (camera_.Unproject(pixel) / std::abs(inverse))).z();
+    if (!(z > kMinDepth)) return 0;
+  }
+  return sign / z;
+}
+
+// Depths of features and of the grid, each when its row is read. A time that is not quite right makes depth
+// on slanted surfaces less sure.
+void RollingShutter::TakeDepth(const FrameFeatures& seen, const Vector6d& motion, double first_m,
+                               FrameFeatures* out) const {
+  const DepthImage& depth = *seen.depth_image;
+  const auto look = [&](const Eigen::Vector2d& pixel, double first, double late) {
+    const Pose T_taken_row = ExpSE3(motion * (depth.later_s + late - TimeOf(pixel.y())));
+    return InverseDepth(depth, camera_.Unproject(pixel), first, T_taken_row);
+  };
+  for (std::size_t f = 0; f < seen.size(); ++f) {
+    const Eigen::Vector2d pixel(seen.keypoints[f].pt.x, seen.keypoints[f].pt.y);
+    const double first = seen.inverse_depth[f] > 0 ? 1 / double(seen.inverse_depth[f]) : first_m;
+    const double inverse = std::max(0.0, look(pixel, first, 0));
+    out->inverse_depth[f] = static_cast<float>(inverse);
+    const double other = inverse > 0 ? look(pixel, 1 / inverse, kDepthTimeSigma) : 0;
+    out->inverse_depth_sigma[f] =
+        inverse > 0 ? static_cast<float>(std::hypot(depth.inverse_sigma, other > 0 ? other - inverse : 0.0))
+                    : 0.0F;
+  }
+  if (!seen.depth_grid) return;
+  auto grid = std::make_shared<DepthGrid>(*seen.depth_grid);
+  for (int r = 0; r < grid->Rows(); ++r) {
+    for (int c = 0; c < grid->columns; ++c) {
+      float& inverse = grid->inverse_depth[static_cast<std::size_t>(r * grid->columns + c)];
+      const double first = inverse != 0 ? 1 / std::abs(double(inverse)) : first_m;
+      inverse = static_cast<float>(look(grid->PixelOf(r, c), first, 0));
+    }
+  }
+  out->depth_grid = std::move(grid);
+}
 
 std::shared_ptr<const FrameFeatures> RollingShutter::Straighten(const FrameFeatures& seen,
                                                                 const Vector6d& motion, double depth) const {
   auto out = std::make_shared<FrameFeatures>(seen);
   out->rolled.assign(seen.size(), cv::Point2f());
+  if (seen.depth_image) TakeDepth(seen, motion, depth, out.get());
+  out->depth_image.reset();
   for (std::size_t f = 0; f < seen.size(); ++f) {
     cv::KeyPoint& k = out->keypoints[f];
-    const float inverse = seen.inverse_depth[f];
+    const float inverse = out->inverse_depth[f];
     const Eigen::Vector3d ray = camera_.Unproject({k.pt.x, k.pt.y});
     const Pose T_middle_row = ExpSE3(motion * -TimeOf(k.pt.y));
     const Eigen::Vector3d p = T_middle_row * (ray * (inverse > 0 ? 1.0 / double(inverse) : depth));

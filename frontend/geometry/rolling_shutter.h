@@ -55,16 +55,18 @@ struct MotionPrior {
 /// Immutable. Motions are MotionPrior's.
 class RollingShutter {
  public:
-  explicit RollingShutter(const CameraRig& rig) : camera_(rig.camera), readout_s_(rig.readout_s) {}
+  explicit RollingShutter(const CameraRig& rig)
+      : camera_(rig.camera), readout_s_(rig.readout_s), depth_delay_s_(rig.depth_delay_s) {}
 
-  /// False: a global shutter.
-  bool Rolls() const { return readout_s_ > 0; }
+  /// False: a global shutter, and depth of the same time.
+  bool Rolls() const { return readout_s_ > 0 || depth_delay_s_ != 0; }
   const PinholeCamera& camera() const { return camera_; }
   /// When a row is read, counted from the middle row [s].
   double TimeOf(double row) const { return readout_s_ * (row / (camera_.height - 1) - 0.5); }
 
-  /// Features as the camera would have seen them at the time of the middle row: keypoints and depths. `seen`:
-  /// as the image has them. `depth`: of features without a measured one [m].
+  /// Features as the camera would have seen them at the time of the middle row: keypoints and depths, of
+  /// which a depth image is asked where they were in it when it was taken. `seen`: as the image has them.
+  /// `depth`: of features without a measured one [m].
   std::shared_ptr<const FrameFeatures> Straighten(const FrameFeatures& seen, const Vector6d& motion,
                                                   double depth) const;
 
@@ -74,8 +76,14 @@ class RollingShutter {
              Pose* T_camera_world, Vector6d* motion, std::vector<char>* inlier) const;
 
  private:
+  // Inverse depth of a pixel when its row is read (`ray`: of depth 1), from an image that was taken where the
+  // camera was moved by `T_taken_row`; 0 and negative: as DepthImage::InverseAt.
+  double InverseDepth(const DepthImage& depth, const Eigen::Vector3d& ray, double first_m,
+                      const Pose& T_taken_row) const;
+  void TakeDepth(const FrameFeatures& seen, const Vector6d& motion, double first_m, FrameFeatures* out) const;
+
   PinholeCamera camera_;
-  double readout_s_;
+  double readout_s_, depth_delay_s_;
 };
 
 }  // namespace tutti

@@ -46,9 +46,9 @@ std::map<int, int> Votes(const Map& map, const std::vector<int>& landmarks) {
 }
 
 // Where the camera may be, likeliest first: it went on as before, or stopped.
-std::vector<Pose> Predictions(const LastFrame& last, double stamp_s) {
+std::vector<Pose> Predictions(const LastFrame& last, double time_s) {
   std::vector<Pose> predictions;
-  const double since = stamp_s - last.frame.stamp_s;
+  const double since = time_s - last.frame.Time();
   if (last.velocity) predictions.push_back(last.After(std::min(since, kVelocityHolds)));
   if (last.velocity && since > kSurePrediction) predictions.push_back(last.After(kSurePrediction));
   predictions.push_back(last.T_camera_world);
@@ -82,9 +82,9 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
   if (last.reference < 0) return std::nullopt;
   const double depth = std::max(1e-6, map.MedianDepth(last.reference));
   Contest contest{map, lost ? 2 * options_.min_inliers : options_.min_inliers, depth,
-                  last.steady ? ReachOf(last, frame.stamp_s, depth, rig_.sensor) : std::nullopt};
+                  last.steady ? ReachOf(last, frame.Time(), depth, rig_.sensor) : std::nullopt};
   const float base = rig_.sensor == Sensor::kStereo ? 8.0F : 15.0F;
-  const std::vector<Pose> predictions = Predictions(last, frame.stamp_s);
+  const std::vector<Pose> predictions = Predictions(last, frame.Time());
   // Corners near a place may all be those of the next of equal windows, and one camera measures no depths
   // that say so. What is alike just where the motion leads is the right window.
   if (rig_.sensor == Sensor::kMono && last.velocity &&

@@ -12,8 +12,8 @@ bool Reach::Has(const Pose& T_camera_world) const {
   return (T_camera_world.Inverse().translation - center_m).norm() <= radius_m;
 }
 
-std::optional<Reach> ReachOf(const LastFrame& last, double stamp_s, double depth_m, Sensor sensor) {
-  const double since = stamp_s - last.frame.stamp_s;
+std::optional<Reach> ReachOf(const LastFrame& last, double time_s, double depth_m, Sensor sensor) {
+  const double since = time_s - last.frame.Time();
   if (!last.velocity || !(since > 0 && since <= kVelocityHolds)) return std::nullopt;
   if (sensor == Sensor::kMono) {
     const double way = last.velocity->head<3>().norm() * since;

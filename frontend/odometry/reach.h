@@ -18,9 +18,9 @@ struct Reach {
   bool Has(const Pose& T_camera_world) const;
 };
 
-/// Around where the velocity of `last` leads until `stamp_s`, as far as a camera can be accelerated and poses
+/// Around where the velocity of `last` leads until `time_s`, as far as a camera can be accelerated and poses
 /// are known where what it sees is so deep [m]. One camera has no metres: there its way may be half as long
 /// or half as long again. None if the motion says nothing: without a velocity or too long after.
-std::optional<Reach> ReachOf(const LastFrame& last, double stamp_s, double depth_m, Sensor sensor);
+std::optional<Reach> ReachOf(const LastFrame& last, double time_s, double depth_m, Sensor sensor);
 
 }  // namespace tutti

@@ -49,7 +49,7 @@ double SpeedOf(const Vector6d& motion, double depth) {
 
 RollingSearch::Expected RollingSearch::Expect(const Map& map, const TrackedFrame& frame,
                                               const LastFrame& last) const {
-  const double depth = map.MedianDepth(last.reference), dt = frame.stamp_s - last.frame.stamp_s;
+  const double depth = map.MedianDepth(last.reference), dt = frame.Time() - last.frame.Time();
   Expected expected;
   expected.depth = depth > 0 ? depth : kUnknownDepth;
   const bool known = last.velocity && dt > 0 && dt < kMotionHolds;
@@ -127,12 +127,12 @@ std::optional<PoseFix> RollingSearch::Near(const Map& map, const TrackedFrame& f
 }
 
 ImageAligner::Reference RollingSearch::ReferenceOf(const Map& map, const LastFrame& last,
-                                                   double stamp_s) const {
+                                                   double time_s) const {
   const FrameFeatures& before = *last.frame.features;
   ImageAligner::Reference reference{&before,
                                     {last.T_camera_world, last.motion, last.change},
                                     std::vector<double>(before.size(), 0),
-                                    stamp_s - last.frame.stamp_s,
+                                    time_s - last.frame.Time(),
                                     last.step};
   for (std::size_t f = 0; f < before.size(); ++f) {
     const int l = last.matches.landmarks[f];
@@ -158,7 +158,7 @@ std::optional<PoseFix> RollingSearch::Blurred(const Map& map, const TrackedFrame
   fix.sharp = SpeedOf(aligned->motion, expected.depth) * expected.exposure_s <= kBlurred;
   if (!fix.sharp) return fix;
   found.prior.motion = aligned->motion;
-  found.prior.sigma = SigmaOfChange(frame.stamp_s - last.frame.stamp_s, expected.depth);
+  found.prior.sigma = SigmaOfChange(frame.Time() - last.frame.Time(), expected.depth);
   found.prior.since_s = 0;
   std::optional<PoseFix> near = Near(map, frame, last, found);
   if (!near || near->inliers < kManyInliers * options_.min_inliers) return fix;
@@ -186,18 +186,18 @@ std::optional<ExposureEstimate::Misfits> RollingSearch::MisfitsOf(const Map& map
   if (!ask || !(expected.speed_rad_s * kLongExposure > kBlurred)) return std::nullopt;
   const std::optional<CameraMotion> aligned = Aligned(map, frame, last, expected);
   if (!aligned) return std::nullopt;
-  const auto misfits = aligner_.Misfits(ReferenceOf(map, last, frame.stamp_s), *frame.features, *aligned);
+  const auto misfits = aligner_.Misfits(ReferenceOf(map, last, frame.Time()), *frame.features, *aligned);
   return misfits[0] > 0 ? std::optional(misfits) : std::nullopt;
 }
 
 // Where the grey values of the last frame say that the camera is.
 std::optional<CameraMotion> RollingSearch::Aligned(const Map& map, const TrackedFrame& frame,
                                                    const LastFrame& last, const Expected& expected) const {
-  const double dt = frame.stamp_s - last.frame.stamp_s;
+  const double dt = frame.Time() - last.frame.Time();
   if (!(dt > 0 && dt < kMotionHolds)) return std::nullopt;
   MotionPrior prior = expected.prior;
   if (last.step) prior.sigma = SigmaOfChange(dt, expected.depth);
-  std::optional<CameraMotion> found = aligner_.Align(ReferenceOf(map, last, frame.stamp_s), *frame.features,
+  std::optional<CameraMotion> found = aligner_.Align(ReferenceOf(map, last, frame.Time()), *frame.features,
                                                      expected.camera, prior, expected.exposure_s);
   if (!found) return std::nullopt;
   const Vector6d step = LogSE3(found->T_camera_world * last.T_camera_world.Inverse());

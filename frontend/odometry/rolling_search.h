@@ -42,7 +42,7 @@ class RollingSearch {
                                       const Expected& expected) const;
   std::optional<PoseFix> Blurred(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                  const Expected& expected) const;
-  ImageAligner::Reference ReferenceOf(const Map& map, const LastFrame& last, double stamp_s) const;
+  ImageAligner::Reference ReferenceOf(const Map& map, const LastFrame& last, double time_s) const;
   PoseFix FixByGrey(const TrackedFrame& frame, const LastFrame& last, const Expected& found) const;
   std::optional<ExposureEstimate::Misfits> MisfitsOf(const Map& map, const TrackedFrame& frame,
                                                      const LastFrame& last, const Expected& expected) const;

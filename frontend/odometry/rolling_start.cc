@@ -11,7 +11,7 @@ bool RollingStart::Is(const LastFrame& last) const {
 
 std::optional<Vector6d> RollingStart::MotionOf(const LastFrame& first, const PoseFix& next,
                                                const Vector6d& assumed) {
-  const double dt = next.frame.stamp_s - first.frame.stamp_s;
+  const double dt = next.frame.Time() - first.frame.Time();
   if (!next.motion || !(dt > 0 && dt < kMotionHolds)) return std::nullopt;
   const Vector6d step = LogSE3(next.T_camera_world * first.T_camera_world.Inverse()) / dt;
   return step - 0.5 * (*next.motion - assumed);

@@ -19,10 +19,14 @@ struct TrackedFrame {
   std::int64_t index = 0;
   double stamp_s = 0;
   std::shared_ptr<const FrameFeatures> features;
+  double clock_s = 0;  ///< InputFrame::clock_s
+
+  /// For motions; the stamp is for what others compare frames with.
+  double Time() const { return stamp_s + clock_s; }
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(index, stamp_s, features);
+    archive(index, stamp_s, features, clock_s);
   }
 };
 

@@ -26,14 +26,14 @@ Tracker::Tracked Tracker::Relocalize(int keyframe, PoseFix fix, const Map& map) 
 // True if it is within reach of the motion so far.
 bool Tracker::GoesOn(const PoseFix& fix, const Map& map) const {
   if (!last_.velocity) return false;
-  const auto reach = ReachOf(last_, fix.frame.stamp_s, map.MedianDepth(last_.reference), sensor_);
+  const auto reach = ReachOf(last_, fix.frame.Time(), map.MedianDepth(last_.reference), sensor_);
   return reach && reach->Has(fix.T_camera_world);
 }
 
 // The frame has this pose: it may become a keyframe, and is what the next one starts from.
 Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
   const KeyframeNeed need = policy_.Need(map, fix, last_);
-  const double dt = fix.frame.stamp_s - last_.frame.stamp_s;
+  const double dt = fix.frame.Time() - last_.frame.Time();
   const bool moves = state_ == TrackingState::kTracking && dt > 0 && dt < kLongestGap;
   last_.steady = moves && GoesOn(fix, map);
   // What grey values had drifted by before is no motion.
@@ -78,7 +78,7 @@ void Tracker::Keep(const PoseFix& fix) {
 void Tracker::Begin(const TrackedFrame& frame, const Keyframe& keyframe) {
   // That the camera goes on as it did is likelier than that it has stopped: what stands still before it in
   // the first frame may be a lorry that drives along. Another map of one camera has another unit.
-  const double lost_s = frame.stamp_s - last_.frame.stamp_s;
+  const double lost_s = frame.Time() - last_.frame.Time();
   if (sensor_ == Sensor::kMono || !(lost_s >= 0 && lost_s <= kVelocityHolds)) last_.velocity.reset();
   const std::optional<Vector6d> velocity = last_.velocity;
   Move(std::nullopt, 0);

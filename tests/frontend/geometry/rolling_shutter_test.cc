@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "tests/frontend/geometry/rolling_scene.h"
@@ -27,6 +29,52 @@ TEST(RollingShutterTest, StraightenedFeaturesAreWhereTheMiddleRowsTimeSawThem) {
     most = std::max(most, straight->Rolled(f).norm());
   }
   EXPECT_GT(most, 10);
+}
+
+// A slanted wall, n p = 2 in the camera at the middle row's time, whose depth was taken 15 ms before.
+TEST(RollingShutterTest, DepthIsLookedUpWhereAFeatureWasWhenDepthWasTaken) {
+  const RollingScene scene(0.01);
+  const Eigen::Vector3d normal(0.4, -0.3, 1);
+  const auto depth_of = [&](const Eigen::Vector2d& pixel, const Pose& T_now_middle) {
+    const Eigen::Vector3d ray = T_now_middle.Inverse().rotation * scene.rig.camera.Unproject(pixel);
+    return (2 - normal.dot(T_now_middle.Inverse().translation)) / normal.dot(ray);
+  };
+  auto depth = std::make_shared<DepthImage>();
+  depth->metres.create(scene.rig.camera.height, scene.rig.camera.width, CV_32FC1);
+  depth->later_s = -0.015;
+  depth->inverse_sigma = 0.003;
+  const Pose taken = ExpSE3(scene.motion * depth->later_s);
+  for (int v = 0; v < depth->metres.rows; ++v) {
+    for (int u = 0; u < depth->metres.cols; ++u)
+      depth->metres.at<float>(v, u) = static_cast<float>(depth_of({u, v}, taken));
+  }
+  FrameFeatures seen = scene.Features();
+  seen.inverse_depth_sigma.resize(seen.size());
+  std::size_t known = 0;
+  float least_sure = 0;
+  double off_as_it_comes = 0;
+  for (std::size_t f = 0; f < seen.size(); ++f) {
+    const cv::Point2f& k = seen.keypoints[f].pt;
+    seen.inverse_depth[f] =
+        depth->InverseAt(static_cast<int>(std::lround(k.x)), static_cast<int>(std::lround(k.y)));
+    off_as_it_comes =
+        std::max(off_as_it_comes,
+                 std::abs(double(seen.inverse_depth[f]) -
+                          1 / depth_of({k.x, k.y}, ExpSE3(scene.motion * scene.shutter.TimeOf(k.y)))));
+  }
+  EXPECT_GT(off_as_it_comes, 0.01);
+  seen.depth_image = depth;
+  const auto straight = scene.shutter.Straighten(seen, scene.motion, 2);
+  EXPECT_FALSE(straight->depth_image);
+  for (std::size_t f = 0; f < seen.size(); ++f) {
+    if (straight->inverse_depth[f] == 0) continue;  // it was beside the image then
+    ++known;
+    const cv::Point2f& k = straight->keypoints[f].pt;
+    EXPECT_NEAR(straight->inverse_depth[f], 1 / depth_of({k.x, k.y}, Pose()), 0.002) << f;
+    least_sure = std::max(least_sure, straight->inverse_depth_sigma[f]);
+  }
+  EXPECT_GT(known, seen.size() / 2);
+  EXPECT_GT(least_sure, 0.0032F) << "the time of depth is not known for sure";
 }
 
 TEST(RollingShutterTest, TheRowsTellHowTheCameraMoves) {
@@ -77,6 +125,8 @@ TEST(RollingShutterTest, AGlobalShutterDoesNotRoll) {
   rig.readout_s = 0;
   EXPECT_FALSE(RollingShutter(rig).Rolls());
   EXPECT_TRUE(RollingShutter(RollingRig()).Rolls());
+  rig.depth_delay_s = 0.01;
+  EXPECT_TRUE(RollingShutter(rig).Rolls()) << "depth is of another time";
   EXPECT_NEAR(RollingShutter(RollingRig()).TimeOf(0), -0.015, 1e-12);
   EXPECT_NEAR(RollingShutter(RollingRig()).TimeOf(300), 0.015, 1e-12);
 }

@@ -118,6 +118,10 @@ struct DatasetOptions {
   TUTTI_OPTION(double, readout_s, 0,
                "rolling shutter: the last row is read so long after the first; 0: all rows at once", Basic(),
                Section("camera"), Unit("s"), From(0), To(0.1));
+  TUTTI_OPTION(double, depth_delay_s, 0,
+               "RGB-D: a depth image was taken so long before its time stamp, by the colour camera's clock; "
+               "negative: after it; 0: unknown, colour and depth are taken to be of one time",
+               Section("camera"), Unit("s"), From(-0.1), To(0.1));
   TUTTI_OPTIONS_END;
 
   /// Empty if usable, else what is wrong.

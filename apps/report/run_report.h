@@ -64,6 +64,7 @@ class DetectionLog : public RunObserver {
   static constexpr std::size_t kMostLandmarks = 3000;
 
   bool WantsPosteriors() const override { return true; }
+  void OnRestart() override { *this = DetectionLog(); }
   void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
   void OnDetection(const LoopResult& result) override;
   void OnEnd(const RunState& state) override;

@@ -127,6 +127,20 @@ Json GraphJson(const RunResult& r) {
           {"certificate", CertificateJson(proof.certificate)}};
 }
 
+// What the images say of the clocks of an RGB-D camera; `used`: the run was made with it.
+Json ClocksJson(const RunResult& r) {
+  Json json = Json::object();
+  const auto put = [&](const char* name, double ClocksFound::*value, double ClocksFound::*sigma) {
+    const bool used = r.clocks_used && (*r.clocks_used).*sigma > 0;
+    const std::optional<ClocksFound>& from = used ? r.clocks_used : r.clocks;
+    if (from && std::isfinite((*from).*sigma))
+      json[name] = {{"value", (*from).*value}, {"sigma", (*from).*sigma}, {"used", used}};
+  };
+  put("readout_s", &ClocksFound::readout_s, &ClocksFound::readout_sigma_s);
+  put("depth_delay_s", &ClocksFound::depth_delay_s, &ClocksFound::depth_delay_sigma_s);
+  return json;
+}
+
 // What self-calibration says of the lens.
 Json LensJson(const LensFound& lens) {
   Json json = {{"k1", lens.k1},
@@ -305,6 +319,7 @@ std::string SummaryJson(const RunResult& r) {
                           {"other_lens", r.lens_check.other_lens}};
   if (r.focal_length) json["focal_length"] = FocalLengthJson(r);
   if (r.lens) json["lens"] = LensJson(*r.lens);
+  if (r.clocks || r.clocks_used) json["clocks"] = ClocksJson(r);
   if (r.height)
     json["height"] = {{"height", r.height->height},
                       {"measurements", r.height->measurements},

@@ -52,6 +52,9 @@ class RunObserver {
   /// True: OnDetection gets posterior_by_location and the members' evidence, which costs O(locations x
   /// members) per image.
   virtual bool WantsPosteriors() const { return false; }
+  /// The run begins anew, at its first frame, with what it found out of its camera: nothing that came before
+  /// counts. OnStart follows.
+  virtual void OnRestart() {}
   /// Before the first frame. `frames`: that are to come, 0: nobody knows how many.
   virtual void OnStart(const CameraRig& /*rig*/, std::size_t /*frames*/) {}
   /// After each frame that could be read.

@@ -165,6 +165,7 @@ void CollectMap(const RunState& state, RunResult& result) {
   result.stereo_row_error_px = report.stereo_row_error_px;
   result.stereo_matches = report.stereo_matches;
   result.lens = report.lens;
+  result.clocks = report.clocks;
   result.height = report.height;
   result.map_figures = MeasureMap(odometry, session);
   CollectKeyframes(odometry, session, result);

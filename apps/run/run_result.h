@@ -161,8 +161,10 @@ struct RunResult {
   std::vector<StageTiming> stages;         ///< with RunRequest::timing or trace only
   double peak_memory_mb = 0;
   double stereo_row_error_px = 0, stereo_matches = 0;
-  std::optional<LensFound> lens;      ///< mono, with self-calibration
-  std::optional<HeightFound> height;  ///< mono, where the ground was seen
+  std::optional<LensFound> lens;           ///< mono, with self-calibration
+  std::optional<ClocksFound> clocks;       ///< RGB-D, where readout_s and depth_delay_s are not told
+  std::optional<ClocksFound> clocks_used;  ///< measured, and put into config; standard deviation 0: not
+  std::optional<HeightFound> height;       ///< mono, where the ground was seen
 
   std::filesystem::path folder;  ///< where everything was written: RunRequest::out, or "unfinished" inside
 

@@ -1,5 +1,7 @@
 #include "apps/run/runner.h"
 
+#include <array>
+#include <cstdio>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -22,6 +24,37 @@ namespace tutti {
 namespace fs = std::filesystem;
 
 namespace {
+
+// Sets what was found of the camera's clocks for a run that begins anew.
+void BeginAnew(const RunRequest& request, const ClocksFound& found, const RunResult& blank,
+               std::unique_ptr<Dataset>& dataset, RunResult& result) {
+  ClocksFound clocks = result.clocks_used.value_or(ClocksFound());
+  DatasetOptions options = result.config.dataset;
+  std::array<char, 120> text{};
+  if (found.readout_s > 0) {
+    clocks.readout_s = found.readout_s;
+    clocks.readout_sigma_s = found.readout_sigma_s;
+    // The option is of the rows as they were taken, before rectification.
+    options.readout_s = found.readout_s;
+    const double rectified = OpenDataset(request.dataset, options)->Rig().readout_s;
+    options.readout_s *= found.readout_s / rectified;
+    std::snprintf(text.data(), text.size(), "the camera reads its rows in %.1f ms (camera.readout_s)",
+                  1e3 * found.readout_s);
+  } else {
+    clocks.depth_delay_s = options.depth_delay_s = found.depth_delay_s;
+    clocks.depth_delay_sigma_s = found.depth_delay_sigma_s;
+    std::snprintf(text.data(), text.size(),
+                  "depth is %.1f ms older than its time stamps say (camera.depth_delay_s)",
+                  1e3 * found.depth_delay_s);
+  }
+  if (!request.quiet) internal::Say("measured: %s; the run begins anew with that", text.data());
+  result = blank;
+  result.config.dataset = options;
+  result.clocks_used = clocks;
+  dataset = OpenDataset(request.dataset, options);
+  result.rig = dataset->Rig();
+  for (const auto& observer : request.observers) observer->OnRestart();
+}
 
 // The path that leads there from any folder.
 std::string Absolute(const fs::path& path) {
@@ -108,7 +141,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
     odometry.emplace(*request.odometry, request.dataset, result.config.dataset);
     result.config = FollowingConfig(result.config);
   }
-  const std::unique_ptr<Dataset> dataset =
+  std::unique_ptr<Dataset> dataset =
       odometry ? odometry->Open() : OpenDataset(request.dataset, result.config.dataset);
   result.rig = dataset->Rig();
   if (auto& camera = result.config.dataset.camera; camera && camera->width == 0) {  // of a pipe
@@ -142,17 +175,25 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
       internal::Say("warning: the calibration can't be right: %s; %s", f.measured.c_str(), f.advice.c_str());
     }
   }
-  SlamRun run(request, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);
+  std::unique_ptr<SlamRun> run;
   Attempts attempts;
-  attempts.Try([&] { run.TrackAll(); });
-  attempts.Try([&] { run.Count(); });
-  if (!attempts.Failed()) attempts.Try([&] { run.TrackUntouched(); });
-  attempts.Try([&] { run.Collect(); });
+  attempts.Try([&] {
+    const RunResult blank = result;
+    while (!run || run->clocks()) {
+      if (run) BeginAnew(request, *run->clocks(), blank, dataset, result);
+      run = std::make_unique<SlamRun>(request, *dataset, odometry ? &*odometry : nullptr, folder.path(),
+                                      result);
+      run->TrackAll();
+    }
+  });
+  attempts.Try([&] { run->Count(); });
+  if (!attempts.Failed()) attempts.Try([&] { run->TrackUntouched(); });
+  attempts.Try([&] { run->Collect(); });
   attempts.Try([&] { MeasureLoops(result); });
   if (reference) attempts.Try([&] { EvaluateRun(reference->first, reference->second, result); });
   result.failure = attempts.Failure();
-  const auto trace = [&run] { return run.Trace(); };
-  const auto map = [&run](const fs::path& file) { run.Map().Write(file); };
+  const auto trace = [&run] { return run->Trace(); };
+  const auto map = [&run](const fs::path& file) { run->Map().Write(file); };
   WriteOutputs(folder, request, result, map, request.trace ? trace : std::function<std::string()>());
   attempts.Rethrow();
   return result;

@@ -17,6 +17,10 @@ namespace {
 class SequenceRecorder : public RunObserver {
  public:
   explicit SequenceRecorder(TrackedSequence& sequence) : sequence_(sequence) {}
+  void OnRestart() override {
+    sequence_ = TrackedSequence();
+    frames_ = 0;
+  }
   void OnFrame(const InputFrame&, const TrackResult&, const RunState&) override { ++frames_; }
   void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override {
     // Called before the OnFrame of the frame that is being tracked.

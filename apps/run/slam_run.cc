@@ -14,6 +14,9 @@
 namespace tutti {
 namespace {
 
+constexpr std::size_t kAskClocks = 10;      // frames
+constexpr double kSureClock = 1e-3;         // standard deviation with which a run begins anew [s]
+constexpr double kClockMatters = 4e-3;      // smaller times make little difference [s]
 constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry without loops may follow
 
 }  // namespace
@@ -98,6 +101,7 @@ void SlamRun::TrackAll() {
       status += "  loops " + std::to_string(CountAccepted(slam_->loops())) + "/" +
                 std::to_string(slam_->loops().size());
     progress.Update(++so_far_.next, status);
+    if (KnowsClocks()) return;
   }
   result_.interrupted = InterruptGuard::Requested();
   if (checkpoints_) EndCheckpoints(progress);
@@ -115,6 +119,26 @@ void SlamRun::TrackAll() {
     progress.Note("tutti: real time: " + std::to_string(so_far_.dropped.size()) + " of " +
                   std::to_string(so_far_.next) + " frames were dropped");
   }
+}
+
+bool SlamRun::KnowsClocks() {
+  const bool anew = dataset_.FrameSupply() == Supply::kStored && !request_.realtime && !request_.map &&
+                    !request_.resume && given_ == nullptr && slam_->odometry() != nullptr;
+  if (!anew || so_far_.next % kAskClocks != 0) return false;
+  const std::optional<ClocksFound> found = slam_->odometry()->Report().clocks;
+  if (!found) return false;
+  const auto sure = [](double value, double sigma) {
+    return sigma < kSureClock && std::abs(value) > kClockMatters ? value : 0.0;
+  };
+  ClocksFound clocks = *found;
+  clocks.readout_s = sure(found->readout_s, found->readout_sigma_s);
+  // A shutter that rolls bends what depth is compared with.
+  const bool straight = result_.rig.readout_s > 0 || found->readout_sigma_s < kSureClock;
+  clocks.depth_delay_s =
+      straight && clocks.readout_s == 0 ? sure(found->depth_delay_s, found->depth_delay_sigma_s) : 0.0;
+  if (clocks.readout_s <= 0 && clocks.depth_delay_s == 0) return false;
+  clocks_ = clocks;
+  return true;
 }
 
 void SlamRun::Count() {

@@ -80,6 +80,9 @@ class SlamRun {
           const std::filesystem::path& out, RunResult& result);
 
   void TrackAll();
+  /// Why TrackAll has stopped: what the images told of an RGB-D camera's clocks, with which a run that begins
+  /// anew is more precise; the fields that are sure, 0 for the others. None: it has not stopped for that.
+  const std::optional<ClocksFound>& clocks() const { return clocks_; }
   /// What TrackAll went through, also if something broke it off.
   void Count();
   /// What the odometry would have done alone: where it has not tracked beside the run, it does now.
@@ -111,6 +114,8 @@ class SlamRun {
   bool TracksTwice() const {
     return result_.config.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
   }
+  // Whether the clocks of the camera are sure by now; stored data alone can be tracked anew.
+  bool KnowsClocks();
   bool TracksAlong() const { return TracksTwice() && !request_.realtime; }
   bool AloneBeside() const { return TracksAlong() && result_.config.run.threads > 1; }
   // After a run in real time. False if it was interrupted.
@@ -154,6 +159,7 @@ class SlamRun {
   std::optional<Playback> playback_;           // in real time, unless the source keeps time itself
   std::size_t total_ = 0;                      // most frames; endless for a growing data set
   std::optional<Checkpointer> checkpoints_;
+  std::optional<ClocksFound> clocks_;
 };
 
 }  // namespace tutti

@@ -69,6 +69,20 @@ void LiveState::AddEvent(LiveEvent event) {
   if (events_.size() > kMostEvents) events_.pop_front();
 }
 
+void LiveState::OnRestart() {
+  Log("the run begins anew with what it found out of its camera");
+  begun_ = joined_ = new_keyframe_ = false;
+  loops_seen_ = accepted_seen_ = 0;
+  corrections_seen_ = 0;
+  state_seen_.clear();
+  trail_.clear();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  points_.clear();
+  spots_.clear();
+  now_.places = std::make_shared<const std::vector<LivePlace>>();
+  now_.loops = std::make_shared<const std::vector<LiveLoop>>();
+}
+
 void LiveState::OnStart(const CameraRig&, std::size_t frames) {
   const double end = internal::SteadySeconds() + options_.idle_s;
   std::unique_lock<std::mutex> lock(mutex_);

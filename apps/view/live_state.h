@@ -119,6 +119,7 @@ class LiveState : public RunObserver {
   explicit LiveState(LiveViewOptions options = {}) : options_(std::move(options)) {}
 
   // ---- the run's side
+  void OnRestart() override;
   void OnStart(const CameraRig& rig, std::size_t frames) override;
   void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
   void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override;

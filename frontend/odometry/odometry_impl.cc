@@ -28,6 +28,7 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       initializer_(options, rig),
       tracker_(options, rig),
       rolling_start_(rig),
+      clocks_(rig, options),
       relocalizer_(options, rig),
       follower_(options, rig),
       localizer_(options, rig),
@@ -154,7 +155,7 @@ TrackResult Odometry::Impl::FollowFirst(const TrackedFrame& frame, const Pose& T
 }
 
 TrackedFrame Odometry::Impl::Prepare(const InputFrame& input, int features) {
-  TrackedFrame frame{input.index + frame_offset_, input.stamp_s, input.features};
+  TrackedFrame frame{input.index + frame_offset_, input.stamp_s, input.features, input.clock_s};
   if (!frame.features) {
     const ScopedStopwatch watch(&stages_, Lane::kTracking, "extract");
     OdometryOptions options = options_;
@@ -196,7 +197,12 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
 }
 
 TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked) {
-  if (tracked.fix) return Accept(tracked);
+  if (tracked.fix) {
+    TrackResult result = Accept(tracked);
+    if (!localizer_.Begun()) clocks_.Add(map(), frame, *tracked.fix, last(), result.keyframe);
+    return result;
+  }
+  clocks_.Break();
   localizer_.Lost();
   if (relocalizer_.Lose(frame) && !localizer_.Begun()) {  // a loop closure may join the two pieces later
     tracker_.GiveUp();
@@ -267,6 +273,7 @@ OdometryReport Odometry::Impl::Report() const {
   report.stereo_matches = internal::Median(stereo_matches_);
   if (mapper_.lens().Enabled()) report.lens = mapper_.lens().Found();
   report.height = height_.Found();
+  report.clocks = clocks_.Found();
   return report;
 }
 

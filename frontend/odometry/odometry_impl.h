@@ -11,6 +11,7 @@
 #include "core/stopwatch.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/camera_height.h"
+#include "frontend/odometry/clock_estimate.h"
 #include "frontend/odometry/localizer.h"
 #include "frontend/odometry/map_initializer.h"
 #include "frontend/odometry/pose_follower.h"
@@ -101,6 +102,7 @@ class Odometry::Impl {
   MapInitializer initializer_;
   Tracker tracker_;
   RollingStart rolling_start_;
+  ClockEstimate clocks_;
   Relocalizer relocalizer_;
   PoseFollower follower_;
   Localizer localizer_;

@@ -1,0 +1,104 @@
+#include "frontend/odometry/depth_rotation.h"
+
+#include <cmath>
+#include <vector>
+
+#include "core/dense_solvers.h"
+#include "core/least_squares.h"
+
+namespace tutti {
+namespace {
+
+constexpr int kAlignments = 6;
+constexpr int kFewest = 200;         // points that find a surface
+constexpr double kSteep = 0.25;      // cosine between ray and normal, below which a surface is too slanted
+constexpr double kOneSurface = 0.1;  // neighbours whose inverse depths differ by more are of two [1/m]
+constexpr double kInSigmas = 9;      // square of the distance from a surface at which Huber's loss begins
+
+struct Surface {
+  Eigen::Vector3d point, normal;
+};
+
+class Surfaces {
+ public:
+  Surfaces(const PinholeCamera& camera, const DepthGrid& grid) : camera_(camera), grid_(grid) {}
+
+  std::optional<Surface> Towards(const Eigen::Vector3d& p) const {
+    if (!(p.z() > 0.1)) return std::nullopt;
+    const Eigen::Vector2d at =
+        (camera_.Project(p) - Eigen::Vector2d::Constant(grid_.step / 2)) / double(grid_.step);  // NOLINT
+    if (!(at.x() > 0.5 && at.y() > 0.5 && at.x() < grid_.columns - 1.5 && at.y() < grid_.Rows() - 1.5))
+      return std::nullopt;
+    const int c = static_cast<int>(std::lround(at.x())), r = static_cast<int>(std::lround(at.y()));
+    const float here = grid_.At(r, c);
+    for (const float near :
+         {grid_.At(r, c - 1), grid_.At(r, c + 1), grid_.At(r - 1, c), grid_.At(r + 1, c)}) {
+      if (!(here > 0 && near > 0 && std::abs(near - here) < kOneSurface)) return std::nullopt;
+    }
+    Surface surface;
+    surface.point = PointAt(r, c);
+    surface.normal =
+        (PointAt(r, c + 1) - PointAt(r, c - 1)).cross(PointAt(r + 1, c) - PointAt(r - 1, c)).normalized();
+    if (!(std::abs(surface.normal.dot(surface.point.normalized())) > kSteep)) return std::nullopt;
+    return surface;
+  }
+
+  Eigen::Vector3d PointAt(int r, int c) const {
+    return camera_.Unproject(grid_.PixelOf(r, c)) / std::abs(double(grid_.At(r, c)));
+  }
+
+ private:
+  const PinholeCamera& camera_;
+  const DepthGrid& grid_;
+};
+
+}  // namespace
+
+std::optional<DepthRotation> RotationByDepth(const PinholeCamera& camera, const DepthGrid& first,
+                                             const DepthGrid& second, const Pose& T_second_first,
+                                             double inverse_sigma) {
+  const Surfaces from(camera, first), to(camera, second);
+  std::vector<Eigen::Vector3d> points;
+  for (int r = 0; r < first.Rows(); ++r) {
+    for (int c = 0; c < first.columns; ++c) {
+      if (first.At(r, c) > 0) points.push_back(from.PointAt(r, c));
+    }
+  }
+  Pose T = T_second_first;
+  Matrix6d hessian;
+  for (int round = 0; round < kAlignments; ++round) {
+    hessian.setZero();
+    Vector6d gradient = Vector6d::Zero();
+    int found = 0;
+    for (const Eigen::Vector3d& point : points) {
+      const Eigen::Vector3d p = T * point;
+      const std::optional<Surface> surface = to.Towards(p);
+      if (!surface) continue;
+      // Both depths are measured along about the same ray.
+      const double sigma = std::sqrt(2.0) * inverse_sigma * p.z() * p.z() * std::abs(surface->normal.z());
+      const double r = surface->normal.dot(p - surface->point) / sigma;
+      if (!(std::abs(r) < 20)) continue;
+      Vector6d j;
+      j << surface->normal, p.cross(surface->normal);
+      j /= sigma;
+      const double weight = internal::HuberWeight(r * r, kInSigmas);
+      hessian += weight * j * j.transpose();
+      gradient += weight * r * j;
+      ++found;
+    }
+    if (found < kFewest) return std::nullopt;
+    hessian += 1e-6 * Matrix6d::Identity();
+    const Vector6d step = internal::SolveLdlt(Matrix6d(hessian), Vector6d(-gradient));
+    T = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * T;
+    if (!T.IsFinite()) return std::nullopt;
+  }
+  DepthRotation out;
+  out.rotation_rad = LogSE3(T).tail<3>();
+  const Eigen::Matrix3d cross = hessian.topRightCorner<3, 3>();
+  out.information =
+      hessian.bottomRightCorner<3, 3>() -
+      cross.transpose() * internal::Inverse(Eigen::Matrix3d(hessian.topLeftCorner<3, 3>())) * cross;
+  return out;
+}
+
+}  // namespace tutti

@@ -373,7 +373,7 @@ void ImageAligner::MoveOn(const Reference& from, CameraMotion* reference, Camera
   if (!(from.since_s > 0)) return;
   const Vector6d step = LogSE3(now->T_camera_world * reference->T_camera_world.Inverse()) / from.since_s;
   if (!from.step) {
-    if (!shutter_.Rolls()) now->motion = step;
+    if (!shutter_.RowsTell()) now->motion = step;
     return;
   }
   now->change = reference->change = (step - *from.step) / from.since_s;

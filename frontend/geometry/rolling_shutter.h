@@ -60,6 +60,8 @@ class RollingShutter {
 
   /// False: a global shutter, and depth of the same time.
   bool Rolls() const { return readout_s_ > 0 || depth_delay_s_ != 0; }
+  /// True if the rows tell how the camera moves (Refine).
+  bool RowsTell() const { return readout_s_ > 0; }
   const PinholeCamera& camera() const { return camera_; }
   /// When a row is read, counted from the middle row [s].
   double TimeOf(double row) const { return readout_s_ * (row / (camera_.height - 1) - 0.5); }

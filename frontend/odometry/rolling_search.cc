@@ -174,7 +174,7 @@ PoseFix RollingSearch::FixByGrey(const TrackedFrame& frame, const LastFrame& las
   fix.T_camera_world = found.camera.T_camera_world;
   fix.reference = last.reference;
   fix.by_grey = true;
-  if (shutter_.Rolls()) fix.motion = found.camera.motion;
+  if (shutter_.RowsTell()) fix.motion = found.camera.motion;
   return fix;
 }
 
@@ -213,7 +213,7 @@ std::optional<PoseFix> RollingSearch::ByGreyValues(const Map& map, const Tracked
   if (!found) return std::nullopt;
   Expected better = expected;
   better.camera.T_camera_world = found->T_camera_world;
-  if (shutter_.Rolls()) better.camera.motion = found->motion;
+  if (shutter_.RowsTell()) better.camera.motion = found->motion;
   if (auto fix = Near(map, frame, last, better)) return fix;
   PoseFix fix = FixByGrey(frame, last, better);
   fix.sharp = last.exposure.IsKnown();
@@ -243,6 +243,14 @@ PoseFix RollingSearch::Again(const Map& map, const FrameFeatures& seen, const Ex
     const Eigen::Vector2d rolled = straight.Rolled(f);
     found.keypoints[f].pt = straight.keypoints[f].pt -
                             cv::Point2f(static_cast<float>(rolled.x()), static_cast<float>(rolled.y()));
+    if (seen.depth_image) {  // as it was looked up, when the row was read
+      const cv::Point2f& middle = straight.keypoints[f].pt;
+      const double inverse = double(straight.inverse_depth[f]);
+      const Pose T_row_middle = ExpSE3(expected.camera.motion * shutter_.TimeOf(found.keypoints[f].pt.y));
+      const Eigen::Vector3d p = T_row_middle * (shutter_.camera().Unproject({middle.x, middle.y}) / inverse);
+      found.inverse_depth[f] = inverse > 0 && p.z() > kMinDepth ? static_cast<float>(1 / p.z()) : 0.0F;
+      found.inverse_depth_sigma[f] = straight.inverse_depth_sigma[f];
+    }
     const int l = fix.matches.landmarks[f];
     if (l >= 0)
       observations.push_back(Measured(map, found, {-1, static_cast<int>(f)}, l, options_.pixel_sigma));
@@ -250,13 +258,19 @@ PoseFix RollingSearch::Again(const Map& map, const FrameFeatures& seen, const Ex
   Pose T_camera_world = fix.T_camera_world;
   Vector6d motion;
   std::vector<char> inlier;
-  if (shutter_.Refine(observations, expected.prior, &T_camera_world, &motion, &inlier) < options_.min_inliers)
+  const MotionPrior& prior = expected.prior;
+  if (!shutter_.RowsTell()) {  // the step from the last frame does, if it goes on changing as it did
+    if (!(prior.since_s > 0)) return fix;
+    const Vector6d step = LogSE3(T_camera_world * prior.T_camera_world_before.Inverse()) / prior.since_s;
+    motion = step + 0.5 * (step - prior.motion_before);
+  } else if (shutter_.Refine(observations, prior, &T_camera_world, &motion, &inlier) < options_.min_inliers) {
     return fix;
+  }
   PoseFix again = fix;
   again.frame.features = shutter_.Straighten(found, motion, expected.depth);
   again.matches.features = again.frame.features.get();
   again.T_camera_world = T_camera_world;
-  again.motion = motion;
+  if (shutter_.RowsTell()) again.motion = motion;
   return search_.SettleAgain(map, &again) && again.inliers >= options_.min_inliers ? again : fix;
 }
 

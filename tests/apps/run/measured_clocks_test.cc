@@ -38,19 +38,18 @@ struct Ran {
   nlohmann::json summary;
 };
 
-Ran Run(const fs::path& room, int threads) {
+Ran RunUntold(const fs::path& room, int threads) {
   const fs::path out = testing::FreshFolder() / std::to_string(threads);
-  const auto run =
-      RunTutti("run --config " + (room / "config.yaml").string() + " --dataset " + room.string() + " --out " +
-               out.string() + " --no-loops --set camera.readout_s=0 --set camera.depth_delay_s=0 --threads " +
-               std::to_string(threads));
-  EXPECT_EQ(run.exit_code, 0) << run.output;
+  const auto run = RunTutti({"run", "--config", (room / "config.yaml").string(), "--dataset", room.string(),
+                             "--out", out.string(), "--no-loops", "--set", "camera.readout_s=0", "--set",
+                             "camera.depth_delay_s=0", "--threads", std::to_string(threads)});
+  EXPECT_EQ(run.status, 0) << run.output;
   return {run.output, ReadAll(out / "trajectory.txt"), nlohmann::json::parse(ReadAll(out / "summary.json"))};
 }
 
 TEST(MeasuredClocks, ARunBeginsAnewWithReadoutAndDelayOnceTheyAreSure) {
   const fs::path room = testing::GeneratedDataset(RoomInAHand(true));
-  const Ran ran = Run(room, 2);
+  const Ran ran = RunUntold(room, 2);
   EXPECT_THAT(ran.output, HasSubstr("measured: the camera reads its rows in 2"));
   EXPECT_THAT(ran.output, HasSubstr("measured: depth is 1"));
   const nlohmann::json& clocks = ran.summary["clocks"];
@@ -61,11 +60,11 @@ TEST(MeasuredClocks, ARunBeginsAnewWithReadoutAndDelayOnceTheyAreSure) {
   EXPECT_EQ(ran.summary["config"]["camera"]["readout_s"], clocks["readout_s"]["value"]);
   EXPECT_EQ(ran.summary["frames"]["total"], 150) << "those of the last beginning alone";
   EXPECT_LT(ran.summary["evaluation"]["slam"]["ate_rmse_m"].get<double>(), 0.015) << "0.1 without";
-  EXPECT_EQ(Run(room, 1).trajectory, ran.trajectory);
+  EXPECT_EQ(RunUntold(room, 1).trajectory, ran.trajectory);
 }
 
 TEST(MeasuredClocks, OfPerfectClocksNothingIsTaken) {
-  const Ran ran = Run(testing::GeneratedDataset(RoomInAHand(false)), 2);
+  const Ran ran = RunUntold(testing::GeneratedDataset(RoomInAHand(false)), 2);
   EXPECT_THAT(ran.output, Not(HasSubstr("measured")));
   EXPECT_NEAR(ran.summary["clocks"]["depth_delay_s"]["value"].get<double>(), 0, 0.002);
 }

@@ -88,6 +88,13 @@ Value FocalLengthOff(const RunResult& r) {
   return std::max(0.0, std::abs(std::log(r.lens_check.focal_ratio)) - kSigmas * r.lens_check.sigma);
 }
 
+Value ClocksOff(const RunResult& r) {
+  if (!r.clocks) return std::nullopt;
+  const auto off = [](double value, double sigma) { return std::max(0.0, std::abs(value) - 3 * sigma); };
+  return 1e3 * std::max(off(r.clocks->readout_s, r.clocks->readout_sigma_s),
+                        off(r.clocks->depth_delay_s, r.clocks->depth_delay_sigma_s));
+}
+
 // At the middle of the image's left or right edge.
 Value LensOff(const RunResult& r) {
   if (!HasMap(r)) return std::nullopt;
@@ -242,6 +249,12 @@ const std::vector<SignKind>& SignKinds() {
        "radial distortion that the calibration left over, at the middle of the image's side edge", kAbove,
        0.03, kNever, "the lens bends the image by %s at its edge, beyond what the calibration says",
        "check the distortion's model and coefficients", LensOff},
+      {"clocks_off", "ms",
+       "depth cameras: how far, at least, readout or depth's delay are from what the run took them to be "
+       "(less 3 "
+       "standard deviations)",
+       kAbove, 6, kNever, "rows, or depth, are at least %s ms off the time that they are taken to be of",
+       "set camera.readout_s and camera.depth_delay_s to what clocks in summary.json says", ClocksOff},
       {"loops_refused", "share", "loops that were recognised and contradict the map, if there are 3", kAbove,
        0.5, kNever, "the map contradicts %s of the loops that were recognised",
        "its shape or scale may be wrong; loops.csv says why each was refused", LoopsRefused},

@@ -14,9 +14,10 @@
 namespace tutti {
 namespace {
 
-constexpr std::size_t kAskClocks = 10;      // frames
-constexpr double kSureClock = 1e-3;         // standard deviation with which a run begins anew [s]
-constexpr double kClockMatters = 4e-3;      // smaller times make little difference [s]
+constexpr std::size_t kAskClocks = 10;  // frames
+constexpr double kSureDelay = 7e-4;     // the same; half of how far off it may be is none that scatter shows
+constexpr double kSureClock = 1e-3;     // standard deviation with which a run begins anew [s]
+constexpr double kClockMatters = 4e-3;  // smaller times make little difference [s]
 constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry without loops may follow
 
 }  // namespace
@@ -127,15 +128,16 @@ bool SlamRun::KnowsClocks() {
   if (!anew || so_far_.next % kAskClocks != 0) return false;
   const std::optional<ClocksFound> found = slam_->odometry()->Report().clocks;
   if (!found) return false;
-  const auto sure = [](double value, double sigma) {
-    return sigma < kSureClock && std::abs(value) > kClockMatters ? value : 0.0;
+  const auto sure = [](double value, double sigma, double most) {
+    return sigma < most && std::abs(value) > kClockMatters ? value : 0.0;
   };
   ClocksFound clocks = *found;
-  clocks.readout_s = sure(found->readout_s, found->readout_sigma_s);
+  clocks.readout_s = sure(found->readout_s, found->readout_sigma_s, kSureClock);
   // A shutter that rolls bends what depth is compared with.
   const bool straight = result_.rig.readout_s > 0 || found->readout_sigma_s < kSureClock;
-  clocks.depth_delay_s =
-      straight && clocks.readout_s == 0 ? sure(found->depth_delay_s, found->depth_delay_sigma_s) : 0.0;
+  clocks.depth_delay_s = straight && clocks.readout_s == 0
+                             ? sure(found->depth_delay_s, found->depth_delay_sigma_s, kSureDelay)
+                             : 0.0;
   if (clocks.readout_s <= 0 && clocks.depth_delay_s == 0) return false;
   clocks_ = clocks;
   return true;

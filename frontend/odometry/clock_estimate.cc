@@ -19,7 +19,7 @@ constexpr std::size_t kMostViews =
     1;                               //    // slower turning makes landmarks as a global shutter would [rad/s]
 constexpr double kFastest = 1.5;     // beyond which what is bent is far from linear [rad/s]
 constexpr double kFast = 0.5;        // and faster turning bends them [rad/s]
-constexpr double kTurnChange = 0.3;  // of the rate from frame to frame that tells a time [rad/s]
+constexpr double kTurnChange = 0.4;  // of the rate from frame to frame that tells a time [rad/s]
 constexpr float kWide = 3;           // factor of the radius in which landmarks are looked for
 constexpr int kFewestLandmarks = 60;
 constexpr std::size_t kFewestMeasurements = 8;

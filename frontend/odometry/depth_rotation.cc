@@ -9,7 +9,7 @@
 namespace tutti {
 namespace {
 
-constexpr int kAlignments = 6;
+constexpr int kAlignments = 15;
 constexpr int kFewest = 200;         // points that find a surface
 constexpr double kSteep = 0.25;      // cosine between ray and normal, below which a surface is too slanted
 constexpr double kOneSurface = 0.1;  // neighbours whose inverse depths differ by more are of two [1/m]

@@ -394,8 +394,7 @@ void Odometry::Impl::MoveMap(const MapCorrection& correction) {
     const auto moved = correction.S_world_keyframe.find(reference);
     const bool moves = moved != correction.S_world_keyframe.end();
     if (moves) follower_.Rescale(moved->second.scale);
-    tracker_.FollowReference(T_world_old.Inverse().Inverse(),
-                             moves ? moved->second : Similarity(T_world_old));
+    tracker_.FollowReference(T_world_old, moves ? moved->second : Similarity(T_world_old));
   }
   Map* const map = mapper_.MutableMap();
   MoveKeyframes(correction.S_world_keyframe, map);

@@ -42,7 +42,7 @@ TEST(RunSigns, EachHasItsOwnNameAUnitAndASentenceWithOneValueAtMost) {
   std::set<std::string> names;
   for (const SignKind& kind : SignKinds()) {
     EXPECT_TRUE(names.insert(kind.name).second) << kind.name;
-    EXPECT_TRUE(std::set<std::string>({"share", "1", "px", "factor"}).count(kind.unit)) << kind.name;
+    EXPECT_TRUE(std::set<std::string>({"share", "1", "px", "ms", "factor"}).count(kind.unit)) << kind.name;
     const std::string_view says = kind.says;
     EXPECT_EQ(says.find("%s"), says.rfind("%s")) << kind.name;
     EXPECT_FALSE(std::string_view(kind.meaning).empty()) << kind.name;
@@ -110,6 +110,15 @@ TEST(RunSigns, AFocalLengthIsOffOnlyBeyondItsUncertainty) {
   EXPECT_NEAR(*Sign(result, "focal_length_off"), std::log(1.2) - 0.0125, 1e-12);
   result.lens_check.sigma = 0.15;
   EXPECT_EQ(*Sign(result, "focal_length_off"), 0);
+}
+
+TEST(RunSigns, ClocksAreOffOnlyBeyondTheirUncertainty) {
+  RunResult result = StraightAhead();
+  EXPECT_FALSE(Sign(result, "clocks_off")) << "the rig tells them, or there is no depth camera";
+  result.clocks = {0.02, INFINITY, -0.015, 0.002};
+  EXPECT_NEAR(Sign(result, "clocks_off").value(), 9, 1e-9);
+  result.clocks->depth_delay_sigma_s = 0.006;
+  EXPECT_EQ(Sign(result, "clocks_off"), 0.0);
 }
 
 TEST(RunSigns, TheLensIsJudgedAtTheEdgeOfTheImage) {

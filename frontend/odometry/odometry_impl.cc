@@ -127,7 +127,7 @@ TrackResult Odometry::Impl::Follow(const InputFrame& input, const Pose& T_odom_c
       result_.keyframe = InsertKeyframe();
     }
     const LastFrame& last = tracker_.last();
-    AddFrame(last.frame, last.T_camera_world, last.reference);
+    AddFrame(last.frame, last.T_camera_world, newest);
     result_.T_world_camera = last.T_camera_world.Inverse();
   }
   result_.features = static_cast<int>(frame.features->size());
@@ -186,7 +186,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
   tracker_.Begin(frame, keyframe);
   height_.Forget();
   relocalizer_.Found();
-  AddFrame(frame, tracker_.last().T_camera_world, keyframe.id);
+  AddFrame(frame, tracker_.last().T_camera_world, start.before_reference);
   mapper_.Skip(start.keyframe);
   result.state = TrackingState::kTracking;
   result.T_world_camera = keyframe.T_world_camera;
@@ -303,9 +303,10 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   result.inliers = tracked.fix->inliers;
   result.by_grey_values = tracked.fix->by_grey;
   localizer_.Found(*tracked.fix, map());
-  if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
   const LastFrame& last = tracker_.last();
-  AddFrame(last.frame, last.T_camera_world, last.reference);
+  const int before = last.newest_keyframe;
+  if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
+  AddFrame(last.frame, last.T_camera_world, before);
   result.T_world_camera = last.T_camera_world.Inverse();
   if (localizer_.Beyond()) relocalizer_.Wait(last.frame);
   return result;

@@ -46,7 +46,7 @@ struct Keyframe {
 struct MapFrame {
   std::int64_t index = 0;  ///< number of the input frame
   double stamp_s = 0;
-  int keyframe = -1;
+  int keyframe = -1;  ///< the last one before it (or where the camera was found again); of the first: itself
   Pose T_keyframe_frame;
 
   template <class Archive>
@@ -180,9 +180,9 @@ struct FrameRange {
 
 /// Submaps that have frames, by number of frames, most first (ties: the older one). Joined submaps are one.
 std::vector<int> FramePieces(const Map& map, const FrameRange& range = {});
-/// All posed frames so far, T_world_camera, in order of time, through their reference keyframes (so
-/// corrections and local bundle adjustment reach every frame). Only frames of one submap, `piece`; -1: of the
-/// one with most frames.
+/// All posed frames so far, T_world_camera, in order of time, through the keyframes before and after them (so
+/// corrections and local bundle adjustment reach every frame, and leave no step between two). Only frames of
+/// one submap, `piece`; -1: of the one with most frames.
 Trajectory FrameTrajectory(const Map& map, int piece = -1, const FrameRange& range = {});
 /// Same length as FrameTrajectory(map, piece, range): number of the frame of each pose.
 std::vector<std::int64_t> FrameIndices(const Map& map, int piece = -1, const FrameRange& range = {});

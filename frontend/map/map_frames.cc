@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 #include <utility>
 
 namespace tutti {
@@ -19,67 +18,67 @@ void SpreadDrift(int count, const Vector6d& drift, const Eigen::Quaterniond& R_c
     Vector6d own;
     own << turn * Eigen::Vector3d(drift.head<3>()), turn * Eigen::Vector3d(drift.tail<3>());
     frame.T_keyframe_frame = frame.T_keyframe_frame * ExpSE3(own * -part);
+    frame.T_before_frame = frame.T_before_frame * ExpSE3(own * -part);
   }
 }
 
 namespace {
 
-// Where a frame is between the keyframe that it hangs on and the one after it, whose frame hangs there, too.
-struct Between {
-  int next = -1;        // keyframe; -1: none follows
-  std::size_t end = 0;  // its frame
-  double share = 0;     // of the time from the one to the other; of the next one's own frame 1
+// Frames in a row that hang on one keyframe.
+struct Run {
+  std::size_t begin, end;
+  double middle_s;  // where they follow it alone: at its own frame, or half-way
 };
 
-// Removed ones are in it, too.
-std::unordered_map<std::int64_t, int> KeyframesByFrame(const Map& map) {
-  std::unordered_map<std::int64_t, int> ids;
-  for (int id = 0; id < map.KeyframeCount(); ++id) ids[map.keyframe(id).frame_index] = id;
-  return ids;
-}
-
-// By time: each frame takes as little of a correction as there is, also where the camera stands or turns.
-std::vector<Between> BetweenKeyframes(const Map& map) {
-  const std::unordered_map<std::int64_t, int> keyframes = KeyframesByFrame(map);
-  std::vector<Between> all(map.frames().size());
-  std::size_t first = 0;  // of those that hang on `last` since it, or since the camera was found again there
-  double begin_s = 0;
-  int last = -1;
-  for (std::size_t i = 0; i < all.size(); ++i) {
+std::vector<Run> Runs(const Map& map) {
+  std::vector<Run> runs;
+  bool has_own = false;
+  for (std::size_t i = 0; i < map.frames().size(); ++i) {
     const MapFrame& frame = map.frames()[i];
-    if (frame.keyframe != last) {
-      first = i;
-      begin_s = frame.stamp_s;
-      last = frame.keyframe;
+    if (i == 0 || map.frames()[i - 1].keyframe != frame.keyframe) {
+      runs.push_back({i, i, frame.stamp_s});
+      has_own = false;
     }
-    const auto own = keyframes.find(frame.index);
-    if (own == keyframes.end() || map.keyframe(own->second).replaced_by >= 0) continue;
-    const double time = frame.stamp_s - begin_s;
-    for (std::size_t k = first; k < i && time > 0; ++k)
-      all[k] = {own->second, i, (map.frames()[k].stamp_s - begin_s) / time};
-    all[i] = {own->second, i, 1};
-    first = i + 1;
-    begin_s = frame.stamp_s;
-    last = own->second;
+    Run& run = runs.back();
+    run.end = i + 1;
+    if (!has_own) run.middle_s = 0.5 * (map.frames()[run.begin].stamp_s + frame.stamp_s);
+    if (map.keyframe(frame.keyframe).frame_index != frame.index) continue;
+    run.middle_s = frame.stamp_s;
+    has_own = true;
   }
-  return all;
+  return runs;
 }
 
 }  // namespace
 
 std::vector<Pose> FramePoses(const Map& map) {
-  const std::vector<Between> between = BetweenKeyframes(map);
+  const auto T_world_keyframe = [&](int id) { return map.keyframe(id).T_world_camera; };
   std::vector<Pose> poses;
-  poses.reserve(between.size());
-  for (std::size_t i = 0; i < between.size(); ++i) {
-    const auto& [next, end, share] = between[i];
-    const MapFrame& frame = map.frames()[i];
-    const Pose by_last = map.keyframe(frame.keyframe).T_world_camera * frame.T_keyframe_frame;
-    const Pose T_next_frame =
-        next < 0 || end == i ? Pose() : map.frames()[end].T_keyframe_frame.Inverse() * frame.T_keyframe_frame;
-    const Pose by_next = next < 0 ? by_last : map.keyframe(next).T_world_camera * T_next_frame;
-    poses.emplace_back(by_last.rotation.slerp(share, by_next.rotation),
-                       (1 - share) * by_last.translation + share * by_next.translation);
+  poses.reserve(map.frames().size());
+  const std::vector<Run> runs = Runs(map);
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const Run& run = runs[r];
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      const MapFrame& frame = map.frames()[i];
+      poses.push_back(T_world_keyframe(frame.keyframe) * frame.T_keyframe_frame);
+      const bool later = frame.stamp_s >= run.middle_s;
+      if (later ? r + 1 == runs.size() : r == 0) continue;
+      const Run& other = later ? runs[r + 1] : runs[r - 1];
+      const std::size_t first = std::max(run.begin, other.begin);
+      const MapFrame& link = map.frames()[first];
+      const double time = std::abs(other.middle_s - run.middle_s);
+      if (link.before != map.frames()[first - 1].keyframe || !(time > 0)) continue;
+      const Pose T_other_this = later ? link.T_keyframe_frame * link.T_before_frame.Inverse()
+                                      : link.T_before_frame * link.T_keyframe_frame.Inverse();
+      const Pose by_other =
+          T_world_keyframe(later ? link.keyframe : link.before) * T_other_this * frame.T_keyframe_frame;
+      // By time: each frame takes as little of a correction as there is, also where the camera stands or
+      // turns.
+      const double share = std::abs(frame.stamp_s - run.middle_s) / time;
+      Pose& pose = poses.back();
+      pose.rotation = pose.rotation.slerp(share, by_other.rotation);
+      pose.translation = (1 - share) * pose.translation + share * by_other.translation;
+    }
   }
   return poses;
 }
@@ -89,27 +88,25 @@ void RescaleFrames(const std::map<int, Similarity>& S_world_keyframe, Map* map) 
     const auto moved = S_world_keyframe.find(id);
     return moved == S_world_keyframe.end() ? 1.0 : moved->second.scale;
   };
-  const std::vector<Between> between = BetweenKeyframes(*map);
-  for (std::size_t i = 0; i < between.size(); ++i) {
-    const double last = scale_of(std::as_const(*map).frames()[i].keyframe);
-    const double next = between[i].next < 0 ? last : scale_of(between[i].next);
-    const double scale = last * std::pow(next / last, between[i].share);
-    if (scale != 1) map->frame(i).T_keyframe_frame.translation *= scale;
+  for (std::size_t i = 0; i < map->frames().size(); ++i) {
+    const MapFrame& now = std::as_const(*map).frames()[i];
+    const double scale = scale_of(now.keyframe), before = scale_of(now.before);
+    if (scale == 1 && before == 1) continue;
+    MapFrame& frame = map->frame(i);
+    frame.T_keyframe_frame.translation *= scale;
+    frame.T_before_frame.translation *= before;
   }
 }
 
 void RehangFrames(const std::vector<Pose>& poses, Map* map) {
   const Map& now = *map;
-  const std::unordered_map<std::int64_t, int> keyframes = KeyframesByFrame(now);
-  std::map<int, int> before;  // removed keyframe -> the one that its own frame hangs on
   for (std::size_t i = 0; i < poses.size(); ++i) {
     MapFrame& frame = map->frame(i);
-    const int last = frame.keyframe;
-    if (now.keyframe(last).replaced_by >= 0)
-      frame.keyframe = before.count(last) != 0 ? before[last] : now.PresentKeyframe(last);
-    const auto own = keyframes.find(frame.index);
-    if (own != keyframes.end() && own->second != last) before[own->second] = frame.keyframe;
+    frame.keyframe = now.PresentKeyframe(frame.keyframe);
     frame.T_keyframe_frame = now.keyframe(frame.keyframe).T_world_camera.Inverse() * poses[i];
+    if (frame.before < 0) continue;
+    frame.before = now.PresentKeyframe(frame.before);
+    frame.T_before_frame = now.keyframe(frame.before).T_world_camera.Inverse() * poses[i];
   }
 }
 

@@ -13,15 +13,15 @@ namespace tutti {
 /// this rotation (world to camera).
 void SpreadDrift(int count, const Vector6d& drift, const Eigen::Quaterniond& R_camera_world, Map* map);
 
-/// T_world_camera of all frames. Those between two keyframes follow both, the nearer one (in time) more: no
-/// correction of the map leaves a step between them.
+/// T_world_camera of all frames. Where the keyframe that they hang on changes, they follow both, the nearer
+/// one (in time) more, and the keyframes' own frames theirs alone: no correction leaves a step.
 std::vector<Pose> FramePoses(const Map& map);
 
-/// Keyframes are about to move: with their scale, so do the distances of the frames between them.
+/// Keyframes are about to move: with their scale, so do the distances of their frames.
 void RescaleFrames(const std::map<int, Similarity>& S_world_keyframe, Map* map);
 
-/// Keyframes were removed: their frames hang on those before them (or that stand for them), and have the same
-/// `poses` as before (FramePoses).
+/// Keyframes were removed: their frames hang on those that stand for them, and have the `poses` of before
+/// (FramePoses).
 void RehangFrames(const std::vector<Pose>& poses, Map* map);
 
 }  // namespace tutti

@@ -22,9 +22,9 @@ namespace tutti {
 /// From the newest to the oldest, so the first visits stay. So do the first keyframe of each submap, and
 /// those of `keep`. For each one that is removed the older keyframe stands that has most landmarks in common
 /// with it; `may(removed, into)`, asked last, can forbid it, and is then asked for the next one. Landmarks
-/// with fewer than `least_views` views left (that many tell where one is) are removed as well. Frames stay
-/// where they are, and hang on the keyframe before (RehangFrames). Ids stay as they are. Returns which
-/// keyframe stands for each, which may have been removed itself.
+/// with fewer than `least_views` views left (that many tell where one is) are removed as well. Frames hang on
+/// the keyframe that stands for theirs, and stay where they are. Ids stay as they are. Returns which keyframe
+/// stands for each, which may have been removed itself.
 std::map<int, int> Prune(const std::set<int>& keep, std::size_t least_views,
                          const std::function<bool(int removed, int into)>& may, Map* map);
 

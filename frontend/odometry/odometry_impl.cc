@@ -127,7 +127,7 @@ TrackResult Odometry::Impl::Follow(const InputFrame& input, const Pose& T_odom_c
       result_.keyframe = InsertKeyframe();
     }
     const LastFrame& last = tracker_.last();
-    AddFrame(last.frame, last.T_camera_world, newest);
+    AddFrame(last.frame, last.T_camera_world, last.reference);
     result_.T_world_camera = last.T_camera_world.Inverse();
   }
   result_.features = static_cast<int>(frame.features->size());
@@ -186,7 +186,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
   tracker_.Begin(frame, keyframe);
   height_.Forget();
   relocalizer_.Found();
-  AddFrame(frame, tracker_.last().T_camera_world, start.before_reference);
+  AddFrame(frame, tracker_.last().T_camera_world, keyframe.id);
   mapper_.Skip(start.keyframe);
   result.state = TrackingState::kTracking;
   result.T_world_camera = keyframe.T_world_camera;
@@ -196,7 +196,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
 }
 
 TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked) {
-  if (tracked.fix) return Accept(tracked);
+  if (tracked.fix) return Accept(tracked, true);
   localizer_.Lost();
   if (relocalizer_.Lose(frame) && !localizer_.Begun()) {  // a loop closure may join the two pieces later
     tracker_.GiveUp();
@@ -217,7 +217,7 @@ TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
   if (!fix) return result_;
   initializer_.Reset();
   const int features = result_.features;
-  result_ = Accept(tracker_.Relocalize(keyframe, *std::move(fix), map()));
+  result_ = Accept(tracker_.Relocalize(keyframe, *std::move(fix), map()), false);
   result_.features = features;
   return result_;
 }
@@ -235,8 +235,9 @@ void Odometry::Impl::BeginLocalization() {
   result_ = TrackResult();
 }
 
-void Odometry::Impl::AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe) {
-  mapper_.MapOfFrames()->AddFrame(frame.index, frame.stamp_s, keyframe, T_camera_world);
+void Odometry::Impl::AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe,
+                              bool goes_on) {
+  mapper_.MapOfFrames()->AddFrame(frame.index, frame.stamp_s, keyframe, T_camera_world, goes_on);
 }
 
 // Than all frames of this recording.
@@ -292,7 +293,7 @@ std::optional<Matrix6d> Odometry::Impl::PoseCovariance() const {
   return turn * Matrix6d(*covariance) * turn.transpose();
 }
 
-TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
+TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked, bool goes_on) {
   relocalizer_.Found();
   mapper_.CountSeen(*tracked.fix);
   if (tracked.by_grey_before > 0 && tracked.fix->drift)
@@ -303,10 +304,9 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   result.inliers = tracked.fix->inliers;
   result.by_grey_values = tracked.fix->by_grey;
   localizer_.Found(*tracked.fix, map());
-  const LastFrame& last = tracker_.last();
-  const int before = last.newest_keyframe;
   if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
-  AddFrame(last.frame, last.T_camera_world, before);
+  const LastFrame& last = tracker_.last();
+  AddFrame(last.frame, last.T_camera_world, last.reference, goes_on);
   result.T_world_camera = last.T_camera_world.Inverse();
   if (localizer_.Beyond()) relocalizer_.Wait(last.frame);
   return result;

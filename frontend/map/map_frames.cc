@@ -27,8 +27,37 @@ namespace {
 // Frames in a row that hang on one keyframe.
 struct Run {
   std::size_t begin, end;
-  double middle_s;  // where they follow it alone: at its own frame, or half-way
+  double middle_s;      // where they follow it alone: at its own frame, or half-way
+  bool linked = false;  // the camera was tracked into it from the run before
 };
+
+Eigen::Vector3d PositionBy(const Map& map, int keyframe, const Pose& T_keyframe_frame) {
+  return map.keyframe(keyframe).T_world_camera * T_keyframe_frame.translation;
+}
+
+// Whether the first frame of a run knows how it lies to the keyframe of the run before. In a map that a
+// correction has torn it may be off by the tear, which was mended since; then it goes on less steadily from
+// there than from where the keyframes are now.
+bool Links(const Map& map, const Run& before, const Run& after) {
+  const auto& frames = map.frames();
+  const MapFrame &link = frames[after.begin], &last = frames[before.end - 1];
+  if (link.before != last.keyframe) return false;
+  const auto velocity = [&](std::size_t i, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    return Eigen::Vector3d((to - from) / (frames[i].stamp_s - frames[i - 1].stamp_s));
+  };
+  const auto position = [&](std::size_t i) {
+    return PositionBy(map, frames[i].keyframe, frames[i].T_keyframe_frame);
+  };
+  std::size_t step = before.end - 1;  // within a run
+  if (before.end - before.begin < 2) step = after.begin + 1;
+  if (step == after.end) return true;
+  const Eigen::Vector3d usual = velocity(step, position(step - 1), position(step)),
+                        from = position(before.end - 1);
+  const auto change = [&](const Eigen::Vector3d& to) {
+    return (velocity(after.begin, from, to) - usual).norm();
+  };
+  return change(PositionBy(map, link.before, link.T_before_frame)) <= change(position(after.begin));
+}
 
 std::vector<Run> Runs(const Map& map) {
   std::vector<Run> runs;
@@ -46,13 +75,13 @@ std::vector<Run> Runs(const Map& map) {
     run.middle_s = frame.stamp_s;
     has_own = true;
   }
+  for (std::size_t r = 1; r < runs.size(); ++r) runs[r].linked = Links(map, runs[r - 1], runs[r]);
   return runs;
 }
 
 }  // namespace
 
 std::vector<Pose> FramePoses(const Map& map) {
-  const auto T_world_keyframe = [&](int id) { return map.keyframe(id).T_world_camera; };
   std::vector<Pose> poses;
   poses.reserve(map.frames().size());
   const std::vector<Run> runs = Runs(map);
@@ -60,18 +89,17 @@ std::vector<Pose> FramePoses(const Map& map) {
     const Run& run = runs[r];
     for (std::size_t i = run.begin; i < run.end; ++i) {
       const MapFrame& frame = map.frames()[i];
-      poses.push_back(T_world_keyframe(frame.keyframe) * frame.T_keyframe_frame);
+      poses.push_back(map.keyframe(frame.keyframe).T_world_camera * frame.T_keyframe_frame);
       const bool later = frame.stamp_s >= run.middle_s;
-      if (later ? r + 1 == runs.size() : r == 0) continue;
+      if (later ? r + 1 == runs.size() || !runs[r + 1].linked : !run.linked) continue;
       const Run& other = later ? runs[r + 1] : runs[r - 1];
-      const std::size_t first = std::max(run.begin, other.begin);
-      const MapFrame& link = map.frames()[first];
       const double time = std::abs(other.middle_s - run.middle_s);
-      if (link.before != map.frames()[first - 1].keyframe || !(time > 0)) continue;
+      if (!(time > 0)) continue;
+      const MapFrame& link = map.frames()[std::max(run.begin, other.begin)];
       const Pose T_other_this = later ? link.T_keyframe_frame * link.T_before_frame.Inverse()
                                       : link.T_before_frame * link.T_keyframe_frame.Inverse();
-      const Pose by_other =
-          T_world_keyframe(later ? link.keyframe : link.before) * T_other_this * frame.T_keyframe_frame;
+      const Pose by_other = map.keyframe(later ? link.keyframe : link.before).T_world_camera * T_other_this *
+                            frame.T_keyframe_frame;
       // By time: each frame takes as little of a correction as there is, also where the camera stands or
       // turns.
       const double share = std::abs(frame.stamp_s - run.middle_s) / time;

@@ -113,6 +113,16 @@ TEST_F(MapFramesTest, HalfWayBetweenTwoChangesFramesFollowTheirKeyframeAlone) {
     EXPECT_LT(Distance(poses[i].pose, Moved(0.2 * double(i), z[i])), 1e-9) << i;
 }
 
+TEST_F(MapFramesTest, WhatATornMapSaidOfAFrameIsForgottenWhenItIsMended) {
+  map_.keyframe(1).T_world_camera = Moved(1, 0.5);
+  for (int i = 0; i < 7; ++i)
+    map_.AddFrame(10 + i, 0.1 * i, i < 5 ? 0 : 1, Moved(0.2 * i, i < 5 ? 0 : 0.5).Inverse());
+  MoveKeyframes({{1, Similarity(Moved(1, 0))}}, &map_);
+  const Trajectory poses = FrameTrajectory(map_, 0);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    EXPECT_LT(Distance(poses[i].pose, Moved(0.2 * double(i), 0)), 1e-9) << i;
+}
+
 TEST_F(MapFramesTest, FramesDoNotFollowWhatTheCameraWasNotTrackedFromNorWhatHasTheSameTime) {
   for (const bool goes_on : {false, true}) {
     for (int i = 0; i < 4; ++i)

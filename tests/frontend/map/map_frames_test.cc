@@ -182,7 +182,7 @@ TEST_F(MapFramesTest, FramesOfRemovedKeyframesStayWhereTheyAreAndFollowWhatStand
   std::vector<int> order;
   const int third = AddKeyframe(Moved(1.4, 0), &order);
   map_.keyframe(third).frame_index = 7;
-  map_.AddFrame(7, 0.7, 1, Moved(1.4, 0).Inverse());
+  map_.AddFrame(7, 0.7, third, Moved(1.4, 0).Inverse());
   MoveKeyframes({{1, Similarity(Moved(1.1, 0.2, 0.1))}, {third, Similarity(Moved(1.5, 0.1))}}, &map_);
   const Trajectory before = FrameTrajectory(map_, 0);
   const std::vector<Pose> poses = FramePoses(map_);

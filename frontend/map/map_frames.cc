@@ -31,32 +31,26 @@ struct Run {
   bool linked = false;  // the camera was tracked into it from the run before
 };
 
-Eigen::Vector3d PositionBy(const Map& map, int keyframe, const Pose& T_keyframe_frame) {
-  return map.keyframe(keyframe).T_world_camera * T_keyframe_frame.translation;
-}
-
 // Whether the first frame of a run knows how it lies to the keyframe of the run before. In a map that a
 // correction has torn it may be off by the tear, which was mended since; then it goes on less steadily from
 // there than from where the keyframes are now.
 bool Links(const Map& map, const Run& before, const Run& after) {
   const auto& frames = map.frames();
-  const MapFrame &link = frames[after.begin], &last = frames[before.end - 1];
-  if (link.before != last.keyframe) return false;
-  const auto velocity = [&](std::size_t i, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-    return Eigen::Vector3d((to - from) / (frames[i].stamp_s - frames[i - 1].stamp_s));
+  const std::size_t first = after.begin;
+  const MapFrame& link = frames[first];
+  if (link.before != frames[first - 1].keyframe) return false;
+  const auto by = [&](int keyframe, const Pose& T_keyframe_frame) {
+    return Eigen::Vector3d(map.keyframe(keyframe).T_world_camera * T_keyframe_frame.translation);
   };
-  const auto position = [&](std::size_t i) {
-    return PositionBy(map, frames[i].keyframe, frames[i].T_keyframe_frame);
+  const auto position = [&](std::size_t i) { return by(frames[i].keyframe, frames[i].T_keyframe_frame); };
+  const auto velocity = [&](std::size_t i, const Eigen::Vector3d& to) {
+    return Eigen::Vector3d((to - position(i - 1)) / (frames[i].stamp_s - frames[i - 1].stamp_s));
   };
-  std::size_t step = before.end - 1;  // within a run
-  if (before.end - before.begin < 2) step = after.begin + 1;
+  const std::size_t step = before.end - before.begin > 1 ? first - 1 : first + 1;  // within one of them
   if (step == after.end) return true;
-  const Eigen::Vector3d usual = velocity(step, position(step - 1), position(step)),
-                        from = position(before.end - 1);
-  const auto change = [&](const Eigen::Vector3d& to) {
-    return (velocity(after.begin, from, to) - usual).norm();
-  };
-  return change(PositionBy(map, link.before, link.T_before_frame)) <= change(position(after.begin));
+  const Eigen::Vector3d usual = velocity(step, position(step));
+  const auto change = [&](const Eigen::Vector3d& to) { return (velocity(first, to) - usual).norm(); };
+  return change(by(link.before, link.T_before_frame)) <= change(position(first));
 }
 
 std::vector<Run> Runs(const Map& map) {
@@ -100,8 +94,7 @@ std::vector<Pose> FramePoses(const Map& map) {
                                       : link.T_before_frame * link.T_keyframe_frame.Inverse();
       const Pose by_other = map.keyframe(later ? link.keyframe : link.before).T_world_camera * T_other_this *
                             frame.T_keyframe_frame;
-      // By time: each frame takes as little of a correction as there is, also where the camera stands or
-      // turns.
+      // By time: each frame takes the same part of a correction, also where the camera stands or turns.
       const double share = std::abs(frame.stamp_s - run.middle_s) / time;
       Pose& pose = poses.back();
       pose.rotation = pose.rotation.slerp(share, by_other.rotation);

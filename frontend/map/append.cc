@@ -148,6 +148,7 @@ void Append(const Map& of_other_camera, std::int64_t frame_offset, Map* map) {
     MapFrame frame = other.frames()[i];
     frame.index += frame_offset;
     frame.keyframe += keyframes;
+    if (frame.before >= 0) frame.before += keyframes;
     map->Restore(frame);
   }
 }

@@ -86,9 +86,16 @@ void Map::Restore(Keyframe keyframe) {
   keyframes_.Append(std::move(keyframe));
 }
 
-void Map::AddFrame(std::int64_t index, double stamp_s, int id, const Pose& T_camera_world) {
-  const Pose& T_world_keyframe = std::as_const(*this).keyframe(id).T_world_camera;
-  frames_.Append({index, stamp_s, id, T_world_keyframe.Inverse() * T_camera_world.Inverse()});
+void Map::AddFrame(std::int64_t index, double stamp_s, int id, const Pose& T_camera_world, bool goes_on) {
+  const auto keyframe = [this](int k) -> const Keyframe& { return std::as_const(*this).keyframe(k); };
+  const auto hung_on = [&](int k) { return keyframe(k).T_world_camera.Inverse() * T_camera_world.Inverse(); };
+  MapFrame frame{index, stamp_s, id, hung_on(id), -1, {}};
+  const int before = goes_on && frames_.size() > 0 ? frames_[frames_.size() - 1].keyframe : id;
+  if (before != id && keyframe(before).piece == keyframe(id).piece) {
+    frame.before = before;
+    frame.T_before_frame = hung_on(before);
+  }
+  frames_.Append(frame);
 }
 
 int Map::AddLandmark(const Eigen::Vector3d& position, int keyframe, int feature) {

@@ -98,6 +98,7 @@ std::map<int, int> Prune(const std::set<int>& keep, std::size_t least_views,
                          const std::function<bool(int removed, int into)>& may, Map* map) {
   const Map& now = *map;
   const std::set<int> first = FirstOfPieces(now);
+  const std::vector<Pose> poses = FramePoses(now);
   std::map<int, int> removed;
   for (int id = now.KeyframeCount() - 1; id > 0; --id) {
     if (now.keyframe(id).replaced_by >= 0 || keep.count(id) != 0 || first.count(id) != 0) continue;
@@ -109,8 +110,9 @@ std::map<int, int> Prune(const std::set<int>& keep, std::size_t least_views,
     map->RemoveKeyframe(id, *into, least_views);
     removed[id] = *into;
   }
-  if (!removed.empty()) map->UpdateGeometry();
-  RehangFrames(removed, map);
+  if (removed.empty()) return removed;
+  map->UpdateGeometry();
+  RehangFrames(poses, map);
   return removed;
 }
 

@@ -198,7 +198,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
 
 TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked) {
   if (tracked.fix) {
-    TrackResult result = Accept(tracked);
+    TrackResult result = Accept(tracked, true);
     if (!localizer_.Begun()) clocks_.Add(map(), frame, *tracked.fix, last(), result.keyframe);
     return result;
   }
@@ -223,7 +223,7 @@ TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
   if (!fix) return result_;
   initializer_.Reset();
   const int features = result_.features;
-  result_ = Accept(tracker_.Relocalize(keyframe, *std::move(fix), map()));
+  result_ = Accept(tracker_.Relocalize(keyframe, *std::move(fix), map()), false);
   result_.features = features;
   return result_;
 }
@@ -241,8 +241,9 @@ void Odometry::Impl::BeginLocalization() {
   result_ = TrackResult();
 }
 
-void Odometry::Impl::AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe) {
-  mapper_.MapOfFrames()->AddFrame(frame.index, frame.stamp_s, keyframe, T_camera_world);
+void Odometry::Impl::AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe,
+                              bool goes_on) {
+  mapper_.MapOfFrames()->AddFrame(frame.index, frame.stamp_s, keyframe, T_camera_world, goes_on);
 }
 
 // Than all frames of this recording.
@@ -299,7 +300,7 @@ std::optional<Matrix6d> Odometry::Impl::PoseCovariance() const {
   return turn * Matrix6d(*covariance) * turn.transpose();
 }
 
-TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
+TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked, bool goes_on) {
   relocalizer_.Found();
   mapper_.CountSeen(*tracked.fix);
   if (tracked.by_grey_before > 0 && tracked.fix->drift)
@@ -312,7 +313,7 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   localizer_.Found(*tracked.fix, map());
   if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
   const LastFrame& last = tracker_.last();
-  AddFrame(last.frame, last.T_camera_world, last.reference);
+  AddFrame(last.frame, last.T_camera_world, last.reference, goes_on);
   result.T_world_camera = last.T_camera_world.Inverse();
   if (localizer_.Beyond()) relocalizer_.Wait(last.frame);
   return result;

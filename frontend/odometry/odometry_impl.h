@@ -86,12 +86,12 @@ class Odometry::Impl {
   TrackResult Initialize(const TrackedFrame& frame);
   TrackResult FollowFirst(const TrackedFrame& frame, const Pose& T_odom_camera);
   TrackResult TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked);
-  TrackResult Accept(const Tracker::Tracked& tracked);
+  TrackResult Accept(const Tracker::Tracked& tracked, bool goes_on);
   bool BecomesKeyframe(const Tracker::Tracked& tracked) const;
   int InsertKeyframe();
   void KeepScale();
   void MoveMap(const MapCorrection& correction);
-  void AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe);
+  void AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe, bool goes_on = true);
   bool IsLater(double stamp_s) const;
   void Check(const internal::SectionReader& file) const;
 

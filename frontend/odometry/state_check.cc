@@ -116,6 +116,8 @@ void Map::Check(const SectionReader& file) const {
   for (std::size_t i = 0; i < frames().size(); ++i) {
     CheckKeyframe(frames()[i].keyframe, *this, file);
     CheckPose(frames()[i].T_keyframe_frame, file);
+    CheckKeyframe(frames()[i].before, *this, file, true);
+    CheckPose(frames()[i].T_before_frame, file);
   }
   CheckViews(*this, file);
   CheckReplacements(*this, file);

@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <set>
 #include <string>
 #include <string_view>
+
+#include "frontend/features/features.h"
 
 namespace tutti {
 namespace {
@@ -101,6 +104,23 @@ TEST(RunSigns, FramesThatAreMissingAreNoJump) {
   RunResult result = StraightAhead();
   result.trajectory.erase(result.trajectory.begin() + 40, result.trajectory.begin() + 50);
   EXPECT_NEAR(*Sign(result, "speed_jump"), 1, 1e-6);
+}
+
+TEST(RunSigns, ACorrectionThatMovesHalfOfTheMapIsNoJump) {
+  RunResult result = StraightAhead();
+  Map map({1.0F});
+  for (int id = 0; id < 20; ++id) {
+    Keyframe keyframe;
+    keyframe.frame_index = 5 * id;
+    keyframe.T_world_camera.translation.z() = 5 * id;
+    keyframe.features = std::make_shared<const FrameFeatures>();
+    map.AddKeyframe(keyframe);
+  }
+  for (int i = 0; i < 100; ++i)
+    map.AddFrame(i, 0.1 * i, i / 5, result.trajectory[static_cast<std::size_t>(i)].pose.Inverse());
+  for (int id = 10; id < 20; ++id) map.keyframe(id).T_world_camera.translation.z() += 6;
+  result.trajectory = FrameTrajectory(map);
+  EXPECT_NEAR(*Sign(result, "speed_jump"), 1 + 6.0 / 5, 1e-6);
 }
 
 TEST(RunSigns, AFocalLengthIsOffOnlyBeyondItsUncertainty) {

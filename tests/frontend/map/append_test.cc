@@ -93,6 +93,7 @@ TEST(OtherCamera, AnAppendedMapHasItsOwnNumbers) {
   Map map = MapThatSees(kOld, {0.4, -0.3, 4});
   Map other = MapThatSees(kOld, {-0.2, 0.1, 3});
   other.AddFrame(11, 1.1, 1, Pose());
+  other.AddFrame(12, 1.2, 0, Pose());
   map.RestorePieces(5);
   Append(other, 1000, &map);
   ASSERT_EQ(map.KeyframeCount(), 4);
@@ -106,8 +107,10 @@ TEST(OtherCamera, AnAppendedMapHasItsOwnNumbers) {
   EXPECT_EQ(map.landmark(1).reference, 2);
   EXPECT_EQ(map.keyframe(1).covisible, (std::map<int, int>{{0, 1}}));
   EXPECT_EQ(map.NextPiece(), 6);
-  EXPECT_EQ(FrameIndices(map, 5), std::vector<std::int64_t>{1011});
+  EXPECT_EQ(FrameIndices(map, 5), (std::vector<std::int64_t>{1011, 1012}));
   EXPECT_EQ(map.frames()[0].keyframe, 3);
+  EXPECT_EQ(map.frames()[0].before, -1);
+  EXPECT_EQ(map.frames()[1].before, 3);
 }
 
 }  // namespace

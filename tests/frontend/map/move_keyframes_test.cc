@@ -78,6 +78,32 @@ TEST(MapCorrection, KeyframesThatCameSinceFollow) {
   EXPECT_EQ(FrameTrajectory(odometry.map()).size(), 40U);
 }
 
+TEST(MapCorrection, LeavesNoStepBetweenFrames) {
+  Odometry odometry = Tracked(40);
+  const Trajectory before = FrameTrajectory(odometry.map());
+  const std::vector<int> ids = odometry.map().KeyframeIds();
+  const std::size_t half = ids.size() / 2;  // the rest is elsewhere, as where a loop's query is
+  const Pose aside(Eigen::Quaterniond::Identity(), {0.4, 0, 0});
+  std::map<int, Similarity> moved;
+  for (std::size_t k = half; k < ids.size(); ++k)
+    moved[ids[k]] = Similarity(aside * odometry.map().keyframe(ids[k]).T_world_camera);
+  odometry.Correct({moved, {}, {}, {}});
+  const Trajectory after = FrameTrajectory(odometry.map());
+  const auto shift = [&](std::size_t i) {
+    return Eigen::Vector3d(after[i].pose.translation - before[i].pose.translation);
+  };
+  double largest = 0;
+  for (std::size_t i = 1; i < after.size(); ++i)
+    largest = std::max(largest, (shift(i) - shift(i - 1)).norm());
+  const auto frames =
+      odometry.map().keyframe(ids[half]).frame_index - odometry.map().keyframe(ids[half - 1]).frame_index;
+  std::printf("  %.3f m in one of %d steps\n", largest, static_cast<int>(frames));
+  ASSERT_GE(frames, 2);
+  EXPECT_LT(largest, 1.2 * 0.4 / static_cast<double>(frames));
+  EXPECT_LT(shift(0).norm(), 1e-9);
+  EXPECT_NEAR(shift(after.size() - 1).x(), 0.4, 1e-9);
+}
+
 TEST(MapCorrection, TheResultIsTheSameWithAndWithoutThreads) {
   std::vector<Trajectory> results;
   for (const bool own_threads : {true, false}) {

@@ -98,6 +98,13 @@ TEST_F(MapCheck, KeyframesThatDoNotFitAreRefused) {
               HasSubstr("sees what is gone"));
 }
 
+TEST_F(MapCheck, FramesThatHangOnNoKeyframeAreRefused) {
+  map_.AddFrame(5, 0.5, 0, Pose());
+  EXPECT_THAT(With([this] { map_.frame(0).keyframe = 2; }), HasSubstr("out of range"));
+  EXPECT_THAT(With([this] { map_.frame(0).before = 2; }), HasSubstr("out of range"));
+  EXPECT_THAT(With([this] { map_.frame(0).T_before_frame.rotation.w() = 7; }), HasSubstr("rotation"));
+}
+
 TEST_F(MapCheck, KeyframesAndLandmarksKnowOfEachOther) {
   const Observation view = std::as_const(map_).landmark(2).observations[0];
   const auto seen = [&](int landmark) {

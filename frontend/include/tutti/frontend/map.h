@@ -48,10 +48,14 @@ struct MapFrame {
   double stamp_s = 0;
   int keyframe = -1;
   Pose T_keyframe_frame;
+  int before =
+      -1;  ///< that the frame before hangs on, if it is another and the camera was tracked from there
+  Pose T_before_frame;  ///< what the map said when the frame came; all that tells how far the two have moved
+                        ///< since
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(index, stamp_s, keyframe, T_keyframe_frame);
+    archive(index, stamp_s, keyframe, T_keyframe_frame, before, T_before_frame);
   }
 };
 
@@ -125,8 +129,9 @@ class Map {
   void UpdateGeometry(int landmark);
   /// Viewing direction and distances of all landmarks.
   void UpdateGeometry();
-  /// A frame has this pose, and hangs on this keyframe.
-  void AddFrame(std::int64_t index, double stamp_s, int keyframe, const Pose& T_camera_world);
+  /// A frame has this pose, and hangs on this keyframe. `goes_on`: it was tracked from the frame before.
+  void AddFrame(std::int64_t index, double stamp_s, int keyframe, const Pose& T_camera_world,
+                bool goes_on = true);
   /// The frames are those of another state of the same map.
   void TakeFrames(const Map& from) { frames_ = from.frames_; }
   /// Gives the memory of dead landmarks back. References to landmarks end.
@@ -181,8 +186,8 @@ struct FrameRange {
 /// Submaps that have frames, by number of frames, most first (ties: the older one). Joined submaps are one.
 std::vector<int> FramePieces(const Map& map, const FrameRange& range = {});
 /// All posed frames so far, T_world_camera, in order of time, through their reference keyframes (so
-/// corrections and local bundle adjustment reach every frame). Only frames of one submap, `piece`; -1: of the
-/// one with most frames.
+/// corrections and local bundle adjustment reach every frame, and leave no step between two). Only frames of
+/// one submap, `piece`; -1: of the one with most frames.
 Trajectory FrameTrajectory(const Map& map, int piece = -1, const FrameRange& range = {});
 /// Same length as FrameTrajectory(map, piece, range): number of the frame of each pose.
 std::vector<std::int64_t> FrameIndices(const Map& map, int piece = -1, const FrameRange& range = {});

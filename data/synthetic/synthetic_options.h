@@ -59,7 +59,8 @@ struct SyntheticOptions {
   /// Rolling shutter: the last row is read so long after the first [s]; 0: all at once. Poses are those of
   /// the middle row
   double readout_s = 0;
-  /// RGB-D: depth images are taken so long before the colour images that they come with [s]; negative: after
+  /// RGB-D: depth images are taken so long before the colour images that they come with [s], row by row as
+  /// those are; negative: after
   double depth_delay_s = 0;
   /// A hand that shakes: fastest turning about each of the camera's axes [deg/s], in bursts, on a lever of
   /// 0.2 m; 0: steady

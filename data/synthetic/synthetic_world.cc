@@ -317,10 +317,8 @@ struct SyntheticWorld::Impl {
     if (!right.empty()) frame.right = Sense(right, 2 * i + 1, dusk);
     if (options.sensor == SyntheticSensor::kRgbd) {
       frame.depth_m = left.depth_m;
-      if (options.readout_s > 0 || options.depth_delay_s != 0) {  // it has a shutter of its own, a global one
-        const double taken = std::max(0.0, frame.stamp_s - options.depth_delay_s);
-        frame.depth_m = ViewFrom(camera, CameraAt(taken), taken, 0).depth_m;
-      }
+      if (options.depth_delay_s != 0)
+        frame.depth_m = View(std::max(0.0, frame.stamp_s - options.depth_delay_s), 0).depth_m;
       if (options.kinect_noise) DepthNoise(frame.depth_m, i);
       const float limit =
           static_cast<float>(std::min(options.max_depth_m, 65535.0 / options.depth_units_per_m));

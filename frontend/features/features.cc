@@ -272,14 +272,13 @@ FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, con
   features.pyramid = shared;
   features.has_depth = !frame.depth_m.empty() || !frame.right.empty();
   if (!frame.depth_m.empty()) {
-    // Time stamps alone say too little of when depth was taken: those of a Kinect are 15 ms off.
-    const double later_s = rig.depth_delay_s != 0 ? frame.depth_later_s - rig.depth_delay_s : 0;
-    DepthImage depth{frame.depth_m, later_s, rig.max_depth_m, options.rgbd_inverse_sigma};
+    DepthImage depth{frame.depth_m, frame.depth_later_s - rig.depth_delay_s, rig.max_depth_m,
+                     options.rgbd_inverse_sigma};
     features.depth_later_s = frame.depth_later_s;
     AddDepthFromImage(depth, &features);
     features.depth_grid = GridOf(depth, frame.mask);
-    if (rig.readout_s > 0 || rig.depth_delay_s != 0)
-      features.depth_image = std::make_shared<const DepthImage>(std::move(depth));
+    // Time stamps alone say too little of when depth was taken: those of a Kinect are 15 ms off.
+    if (rig.depth_delay_s != 0) features.depth_image = std::make_shared<const DepthImage>(std::move(depth));
   }
   if (!frame.right.empty()) {
     const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);

@@ -14,10 +14,10 @@ constexpr double kDepthTimeSigma = 0.0025;  // of the time when a depth image wa
 }  // namespace
 
 double RollingShutter::InverseDepth(const DepthImage& depth, const Eigen::Vector3d& ray, double first_m,
-                                    const Pose& T_taken_row) const {
+                                    const Pose& T_taken_row, int rounds) const {
   const Pose T_row_taken = T_taken_row.Inverse();
   double z = first_m, sign = 1;
-  for (int round = 0; round < kDepthRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     const Eigen::Vector3d then = T_taken_row * (ray * z);
     if (!(then.z() > kMinDepth)) return 0;
     const Eigen::Vector2d pixel = camera_.Project(then);
@@ -38,16 +38,16 @@ double RollingShutter::InverseDepth(const DepthImage& depth, const Eigen::Vector
 void RollingShutter::TakeDepth(const FrameFeatures& seen, const Vector6d& motion, double first_m,
                                FrameFeatures* out) const {
   const DepthImage& depth = *seen.depth_image;
-  const auto look = [&](const Eigen::Vector2d& pixel, double first, double late) {
-    const Pose T_taken_row = ExpSE3(motion * (depth.later_s + late - TimeOf(pixel.y())));
-    return InverseDepth(depth, camera_.Unproject(pixel), first, T_taken_row);
-  };
+  // Rows of depth follow each other as those of colour do, and a pixel moves by few rows.
+  const Pose T_taken_row = ExpSE3(motion * depth.later_s),
+             T_late_row = ExpSE3(motion * (depth.later_s + kDepthTimeSigma));
   for (std::size_t f = 0; f < seen.size(); ++f) {
     const Eigen::Vector2d pixel(seen.keypoints[f].pt.x, seen.keypoints[f].pt.y);
     const double first = seen.inverse_depth[f] > 0 ? 1 / double(seen.inverse_depth[f]) : first_m;
-    const double inverse = std::max(0.0, look(pixel, first, 0));
+    const Eigen::Vector3d ray = camera_.Unproject(pixel);
+    const double inverse = std::max(0.0, InverseDepth(depth, ray, first, T_taken_row, kDepthRounds));
     out->inverse_depth[f] = static_cast<float>(inverse);
-    const double other = inverse > 0 ? look(pixel, 1 / inverse, kDepthTimeSigma) : 0;
+    const double other = inverse > 0 ? InverseDepth(depth, ray, 1 / inverse, T_late_row, 1) : 0;
     out->inverse_depth_sigma[f] =
         inverse > 0 ? static_cast<float>(std::hypot(depth.inverse_sigma, other > 0 ? other - inverse : 0.0))
                     : 0.0F;
@@ -58,7 +58,8 @@ void RollingShutter::TakeDepth(const FrameFeatures& seen, const Vector6d& motion
     for (int c = 0; c < grid->columns; ++c) {
       float& inverse = grid->inverse_depth[static_cast<std::size_t>(r * grid->columns + c)];
       const double first = inverse != 0 ? 1 / std::abs(double(inverse)) : first_m;
-      inverse = static_cast<float>(look(grid->PixelOf(r, c), first, 0));
+      inverse = static_cast<float>(
+          InverseDepth(depth, camera_.Unproject(grid->PixelOf(r, c)), first, T_taken_row, 1));
     }
   }
   out->depth_grid = std::move(grid);

@@ -81,7 +81,7 @@ class RollingShutter {
   // Inverse depth of a pixel when its row is read (`ray`: of depth 1), from an image that was taken where the
   // camera was moved by `T_taken_row`; 0 and negative: as DepthImage::InverseAt.
   double InverseDepth(const DepthImage& depth, const Eigen::Vector3d& ray, double first_m,
-                      const Pose& T_taken_row) const;
+                      const Pose& T_taken_row, int rounds) const;
   void TakeDepth(const FrameFeatures& seen, const Vector6d& motion, double first_m, FrameFeatures* out) const;
 
   PinholeCamera camera_;

@@ -54,6 +54,7 @@ std::pair<double, double> Measurements::Mean() const {
 ClockEstimate::ClockEstimate(const CameraRig& rig, const OdometryOptions& options)
     : readout_wanted_(rig.sensor == Sensor::kRgbd && rig.readout_s == 0),
       delay_wanted_(rig.sensor == Sensor::kRgbd && rig.depth_delay_s == 0),
+      shutter_(rig),
       camera_(rig.camera),
       inverse_sigma_(options.rgbd_inverse_sigma) {}
 
@@ -102,8 +103,10 @@ void ClockEstimate::MeasureDelay() {
   const Eigen::Vector3d at_first = 0.5 * (before + between), at_second = 0.5 * (between + after);
   const Eigen::Vector3d change = at_second - at_first;
   if (!(change.norm() > kTurnChange)) return;
-  const auto found = RotationByDepth(camera_, *first.depth, *second.depth, ExpSE3(second.motion * second.dt),
-                                     inverse_sigma_);
+  Vector6d motion_first = 0.5 * (steps_[1].motion + steps_[2].motion),
+           motion_second = 0.5 * (steps_[2].motion + steps_[3].motion);
+  const auto found = RotationByDepth(shutter_, {*first.depth, motion_first}, {*second.depth, motion_second},
+                                     ExpSE3(second.motion * second.dt), inverse_sigma_);
   if (!found) return;
   const Eigen::Vector3d apart =
       found->rotation_rad - between * second.dt - second.later_s * at_second + first.later_s * at_first;

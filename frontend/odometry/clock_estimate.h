@@ -56,6 +56,7 @@ class ClockEstimate {
   void MeasureDelay();
 
   bool readout_wanted_, delay_wanted_;
+  RollingShutter shutter_;
   PinholeCamera camera_;
   double inverse_sigma_;
   std::deque<Step> steps_;

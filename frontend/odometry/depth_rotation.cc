@@ -1,10 +1,12 @@
 #include "frontend/odometry/depth_rotation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "core/dense_solvers.h"
 #include "core/least_squares.h"
+#include "core/numbers.h"
 
 namespace tutti {
 namespace {
@@ -19,14 +21,21 @@ struct Surface {
   Eigen::Vector3d point, normal;
 };
 
+// Where a grid's pixels are at the time of the middle row.
 class Surfaces {
  public:
-  Surfaces(const PinholeCamera& camera, const DepthGrid& grid) : camera_(camera), grid_(grid) {}
+  Surfaces(const RollingShutter& shutter, const MovingDepth& depth)
+      : camera_(shutter.camera()), grid_(depth.grid) {
+    for (int r = 0; r < grid_.Rows(); ++r)
+      T_row_middle_.push_back(ExpSE3(depth.motion * shutter.TimeOf(grid_.PixelOf(r, 0).y())));
+  }
 
   std::optional<Surface> Towards(const Eigen::Vector3d& p) const {
     if (!(p.z() > 0.1)) return std::nullopt;
-    const Eigen::Vector2d at =
-        (camera_.Project(p) - Eigen::Vector2d::Constant(grid_.step / 2)) / double(grid_.step);  // NOLINT
+    const int row = static_cast<int>(std::lround(std::clamp(CellOf(p).y(), 0.0, grid_.Rows() - 1.0)));
+    const Eigen::Vector3d then = T_row_middle_[internal::Index(row)] * p;
+    if (!(then.z() > 0.1)) return std::nullopt;
+    const Eigen::Vector2d at = CellOf(then);
     if (!(at.x() > 0.5 && at.y() > 0.5 && at.x() < grid_.columns - 1.5 && at.y() < grid_.Rows() - 1.5))
       return std::nullopt;
     const int c = static_cast<int>(std::lround(at.x())), r = static_cast<int>(std::lround(at.y()));
@@ -44,24 +53,30 @@ class Surfaces {
   }
 
   Eigen::Vector3d PointAt(int r, int c) const {
-    return camera_.Unproject(grid_.PixelOf(r, c)) / std::abs(double(grid_.At(r, c)));
+    return T_row_middle_[internal::Index(r)].Inverse() *
+           (camera_.Unproject(grid_.PixelOf(r, c)) / std::abs(double(grid_.At(r, c))));
   }
 
  private:
+  Eigen::Vector2d CellOf(const Eigen::Vector3d& p) const {
+    return (camera_.Project(p) - grid_.PixelOf(0, 0)) / double(grid_.step);
+  }
+
   const PinholeCamera& camera_;
   const DepthGrid& grid_;
+  std::vector<Pose> T_row_middle_;
 };
 
 }  // namespace
 
-std::optional<DepthRotation> RotationByDepth(const PinholeCamera& camera, const DepthGrid& first,
-                                             const DepthGrid& second, const Pose& T_second_first,
+std::optional<DepthRotation> RotationByDepth(const RollingShutter& shutter, const MovingDepth& first,
+                                             const MovingDepth& second, const Pose& T_second_first,
                                              double inverse_sigma) {
-  const Surfaces from(camera, first), to(camera, second);
+  const Surfaces from(shutter, first), to(shutter, second);
   std::vector<Eigen::Vector3d> points;
-  for (int r = 0; r < first.Rows(); ++r) {
-    for (int c = 0; c < first.columns; ++c) {
-      if (first.At(r, c) > 0) points.push_back(from.PointAt(r, c));
+  for (int r = 0; r < first.grid.Rows(); ++r) {
+    for (int c = 0; c < first.grid.columns; ++c) {
+      if (first.grid.At(r, c) > 0) points.push_back(from.PointAt(r, c));
     }
   }
   Pose T = T_second_first;

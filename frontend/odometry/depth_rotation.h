@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "frontend/features/features.h"
-#include "tutti/core/camera.h"
+#include "frontend/geometry/rolling_shutter.h"
 #include "tutti/core/pose.h"
 
 namespace tutti {
@@ -16,12 +16,18 @@ struct DepthRotation {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< of it, the translation being free [1/rad^2]
 };
 
+/// A depth image in short, and how the camera moved (MotionPrior) while its rows were read.
+struct MovingDepth {
+  const DepthGrid& grid;
+  const Vector6d& motion;
+};
+
 /// Aligns the points of one depth grid with the surfaces of the next (point to plane, each point with the
-/// surface that the camera sees in its direction: G. Blais and M. Levine 1995, Y. Chen and G. Medioni 1992),
-/// from about `T_second_first`. `inverse_sigma`: of inverse depth [1/m]. None where too little is seen in
-/// both.
-std::optional<DepthRotation> RotationByDepth(const PinholeCamera& camera, const DepthGrid& first,
-                                             const DepthGrid& second, const Pose& T_second_first,
+/// surface that the camera sees in its direction: Y. Chen, G. Medioni, "Object Modelling by Registration of
+/// Multiple Range Images", 1992), at the times of their middle rows, from about `T_second_first`.
+/// `inverse_sigma`: of inverse depth [1/m]. None where too little is seen in both.
+std::optional<DepthRotation> RotationByDepth(const RollingShutter& shutter, const MovingDepth& first,
+                                             const MovingDepth& second, const Pose& T_second_first,
                                              double inverse_sigma);
 
 }  // namespace tutti

@@ -31,7 +31,8 @@ TEST(RollingShutterTest, StraightenedFeaturesAreWhereTheMiddleRowsTimeSawThem) {
   EXPECT_GT(most, 10);
 }
 
-// A slanted wall, n p = 2 in the camera at the middle row's time, whose depth was taken 15 ms before.
+// A slanted wall, n p = 2 in the camera at the middle row's time, of which each row of depth was read 15 ms
+// before that of colour.
 TEST(RollingShutterTest, DepthIsLookedUpWhereAFeatureWasWhenDepthWasTaken) {
   const RollingScene scene(0.01);
   const Eigen::Vector3d normal(0.4, -0.3, 1);
@@ -43,8 +44,8 @@ TEST(RollingShutterTest, DepthIsLookedUpWhereAFeatureWasWhenDepthWasTaken) {
   depth->metres.create(scene.rig.camera.height, scene.rig.camera.width, CV_32FC1);
   depth->later_s = -0.015;
   depth->inverse_sigma = 0.003;
-  const Pose taken = ExpSE3(scene.motion * depth->later_s);
   for (int v = 0; v < depth->metres.rows; ++v) {
+    const Pose taken = ExpSE3(scene.motion * (depth->later_s + scene.shutter.TimeOf(v)));
     for (int u = 0; u < depth->metres.cols; ++u)
       depth->metres.at<float>(v, u) = static_cast<float>(depth_of({u, v}, taken));
   }

@@ -38,26 +38,31 @@ DepthGrid See(const std::vector<Eigen::Vector4d>& planes, const Pose& T_camera_w
   return grid;
 }
 
+std::optional<DepthRotation> Between(const DepthGrid& first, const DepthGrid& second, const Pose& about) {
+  CameraRig rig;
+  rig.camera = kDepthCamera;
+  const Vector6d rest = Vector6d::Zero();
+  return RotationByDepth(RollingShutter(rig), {first, rest}, {second, rest}, about, kInverseSigma);
+}
+
 TEST(DepthRotation, OfACornerIsFoundToATenthOfADegree) {
   const std::vector<Eigen::Vector4d> corner = {
       {0, 0, 1, 3}, {1, 0, 0.3, 1.9}, {0, 1, 0.1, 1.1}, {0, -1, 0, 1.2}};
   const Pose first(ExpSO3({0.1, 0.05, 0.02}), {0.1, 0, 0}),
       step(ExpSO3({0.05, -0.08, 0.06}), {0.02, -0.01, 0.03});
-  const auto found = RotationByDepth(kDepthCamera, See(corner, first), See(corner, step * first),
-                                     Pose(ExpSO3({0.045, -0.07, 0.055}), {0, 0, 0}), kInverseSigma);
+  const auto found =
+      Between(See(corner, first), See(corner, step * first), Pose(ExpSO3({0.045, -0.07, 0.055}), {0, 0, 0}));
   ASSERT_TRUE(found);
   EXPECT_LT((found->rotation_rad - LogSE3(step).tail<3>()).norm(), 0.0017);
 }
 
 TEST(DepthRotation, AboutTheNormalOfAWallIsUnknown) {
   const std::vector<Eigen::Vector4d> wall = {{0, 0, 1, 2}};
-  const auto found =
-      RotationByDepth(kDepthCamera, See(wall, Pose()), See(wall, Pose()), Pose(), kInverseSigma);
+  const auto found = Between(See(wall, Pose()), See(wall, Pose()), Pose());
   ASSERT_TRUE(found);
   EXPECT_LT(found->information(2, 2), 1e-2 * found->information(0, 0));
   EXPECT_LT(found->information(2, 2), 1e-2 * found->information(1, 1));
-  EXPECT_FALSE(RotationByDepth(kDepthCamera, See({}, Pose()), See(wall, Pose()), Pose(), kInverseSigma))
-      << "nothing is seen";
+  EXPECT_FALSE(Between(See({}, Pose()), See(wall, Pose()), Pose())) << "nothing is seen";
 }
 
 TEST(Measurements, AFewThatAreWildDoNotMoveTheMean) {

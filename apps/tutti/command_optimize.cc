@@ -227,8 +227,8 @@ void SetUpOptimize(CLI::App& command, int&) {
   AddChoice(
       command, "--init", options.init, GraphInit::kAuto,
       "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, often near the "
-      "global minimum where the others are not, and without --robust the optimum of the chordal "
-      "objective, too: the better result counts; auto: the one with the lowest cost");
+      "global minimum where the others are not, and without --robust, if it leaves large residuals, the "
+      "optimum of the chordal objective, too: the better result counts; auto: the one with the lowest cost");
   AddChoice(command, "--objective", options.objective, GraphObjective::kChi2,
             "chi2: g2o's error (vector part of the quaternion); chi2log: rotation vectors");
   AddChoice(
@@ -262,7 +262,10 @@ void SetUpOptimize(CLI::App& command, int&) {
       R"(Costs are sums over all edges without a robust loss and without the factor 1/2. Compare only costs of the same
 column. A loop that is rejected keeps its place in the output file.
 Example: tutti optimize graph.g2o --out optimised.g2o --robust gnc --json costs.json)");
-  command.callback([arguments] { RunOptimize(*arguments); });
+  command.callback([arguments] {
+    arguments->options.will_certify = arguments->certify;
+    RunOptimize(*arguments);
+  });
 }
 
 }  // namespace tutti::cli

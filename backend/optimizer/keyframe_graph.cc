@@ -370,6 +370,7 @@ KeyframeGraphProof KeyframeGraph::Prove(const std::vector<LoopEdge>& loops) cons
   for (const GraphInit init : {GraphInit::kFile, GraphInit::kOdometry, GraphInit::kChordal}) {
     PoseGraphOptions options = options_.solver;
     options.init = init;
+    options.will_certify = true;
     PoseGraph graph = Graph(loops);
     const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph);
     if (!report.success) continue;

@@ -82,7 +82,7 @@ TEST_F(OptimizeCommand, CountsEdgesThatAreGivenTwiceTwice) {
 TEST_F(OptimizeCommand, SaysWhichStartItTook) {
   const std::string loop = "EDGE_SE2 0 9 2 0.1 0 1 0 0 1 0 1\n";
   const std::string run = Done(Optimize(
-      kVertices + std::string(kEdge) + "EDGE_SE2 1 9 1 0 0.2 1 0 0 1 0 1\n" + loop, {"--init", "chordal"}));
+      kVertices + std::string(kEdge) + "EDGE_SE2 1 9 1 0 1.2 1 0 0 1 0 1\n" + loop, {"--init", "chordal"}));
   EXPECT_THAT(run, HasSubstr("from the chordal optimum: "));
   EXPECT_THAT(run, HasSubstr(", taken"));
   EXPECT_THAT(run, HasSubstr("from the chordal relaxation: "));

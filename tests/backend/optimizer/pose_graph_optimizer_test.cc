@@ -79,7 +79,7 @@ TEST(PoseGraphOptimizer, AskingWhetherToStopChangesNothing) {
 
 TEST(PoseGraphOptimizer, TheChordalStartIsTriedAtItsRelaxationAndAtItsOptimum) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
-    PoseGraph graph = MakeSyntheticGraph(NoisyGraphOptions(kind)).graph;
+    PoseGraph graph = MakeSyntheticGraph(testing::NoisyOptions(kind, 0.02, 0.2)).graph;
     PoseGraphOptions options;
     options.init = GraphInit::kChordal;
     const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph);
@@ -96,6 +96,23 @@ TEST(PoseGraphOptimizer, TheChordalStartIsTriedAtItsRelaxationAndAtItsOptimum) {
     EXPECT_EQ(report.starts[0].objective, report.objective);
     EXPECT_LT(report.starts[0].initial_objective, report.starts[1].initial_objective);
     EXPECT_EQ(report.chordal_optimum.size(), graph.nodes().size());
+  }
+}
+
+TEST(PoseGraphOptimizer, TheRelaxationIsTheOnlyChordalStartWhereItLeavesSmallResiduals) {
+  for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3}) {
+    PoseGraph graph = MakeSyntheticGraph(NoisyGraphOptions(kind)).graph;
+    PoseGraphOptions options;
+    options.init = GraphInit::kChordal;
+    PoseGraph certified = graph;
+    const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph);
+    ASSERT_EQ(report.starts.size(), 1u) << ToString(kind);
+    EXPECT_EQ(report.start, GraphStart::kChordalRelaxation);
+    EXPECT_TRUE(report.chordal_optimum.empty());
+    options.will_certify = true;
+    const PoseGraphReport other = PoseGraphOptimizer(options).Optimize(certified);
+    EXPECT_FALSE(other.chordal_optimum.empty());
+    EXPECT_NEAR(other.objective, report.objective, 1e-6 * report.objective);
   }
 }
 

@@ -59,8 +59,37 @@ TEST(Certificate, RefusesALocalMinimum) {
   EXPECT_TRUE(wound.available);
   EXPECT_GT(wound.chordal, 1.0);
   EXPECT_FALSE(wound.certified);
-  EXPECT_LT(wound.lower_bound, wound.chordal);
+  EXPECT_LT(wound.lower_bound, 1e-9);  // without the winding the cost is zero
   EXPECT_FALSE(wound.reason.empty());
+}
+
+// The bound of one shift for all rotations is negative here, which says nothing.
+TEST(Certificate, BoundsTheCostWhereTheRelaxationIsNotTight) {
+  for (const double noise : {0.3, 0.4}) {
+    PoseGraph graph = NoisyGraphOf(GraphKind::kSE3, noise).graph;
+    PoseGraphOptions options;
+    options.init = GraphInit::kChordal;
+    PoseGraphOptimizer(options).Optimize(graph);
+    const Certificate certificate = CertifyOptimum(graph);
+    EXPECT_FALSE(certificate.certified);
+    EXPECT_GT(certificate.lower_bound, 0.7 * certificate.chordal) << noise;
+    EXPECT_LT(certificate.lower_bound, certificate.chordal);
+    EXPECT_NEAR(certificate.relative_gap, 1 - certificate.lower_bound / certificate.chordal, 1e-12);
+  }
+}
+
+// It is one of a function's minimum, so no poses can have less, from wherever it was found.
+TEST(Certificate, BoundsFromAWorsePlaceStayBelowTheOptimum) {
+  testing::SyntheticGraphOptions options = testing::NoisyOptions(GraphKind::kSE2, 0.02, 0.15);
+  options.false_loops = 6;
+  PoseGraph graph = testing::MakeSyntheticGraph(options).graph;
+  PoseGraphOptions chordal;
+  chordal.init = GraphInit::kChordal;
+  PoseGraph best = graph;
+  ASSERT_TRUE(PoseGraphOptimizer(chordal).Optimize(best).success);
+  const double optimum = CertifyOptimum(best).chordal;
+  const Certificate elsewhere = CertifyOptimum(graph);  // the minimum next to the odometry
+  EXPECT_LE(elsewhere.lower_bound, optimum * (1 + 1e-9));
 }
 
 TEST(Certificate, HoldsForGraphsWithoutNoiseAndForSeveralParts) {
@@ -104,6 +133,17 @@ struct Published {
   const char* name;
   double chordal;  // reference_optima.md
 };
+
+TEST(Certificate, IsWithinTwoPerMilleOnM3500b) {
+  TUTTI_REQUIRE_DATA(file, "posegraphs/M3500b.g2o");
+  PoseGraph graph = ReadG2o(file).graph;
+  PoseGraphOptions options;
+  options.init = GraphInit::kChordal;
+  ASSERT_TRUE(PoseGraphOptimizer(options).Optimize(graph).success);
+  const Certificate certificate = CertifyOptimum(graph);
+  EXPECT_FALSE(certificate.certified);
+  EXPECT_LE(certificate.relative_gap, 2e-3);  // one shift for all rotations: 1e-2
+}
 
 class CertificateOfPublishedGraph : public ::testing::TestWithParam<Published> {};
 

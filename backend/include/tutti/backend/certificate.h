@@ -8,7 +8,9 @@
 // a certificate matrix Q - L without a negative eigenvalue proves that nothing better exists. lambda_min >=
 // -eta is shown by a Cholesky factorisation of Q - L + eta I that succeeds (as in Rosen, "Accelerating
 // certifiable estimation with preconditioned eigensolvers", RA-L 2022); Lanczos would bound lambda_min from
-// the wrong side.
+// the wrong side. Where it is negative, L is lowered along the lowest eigenvectors until little of eta is
+// left. The bound holds for all rotations and translations, of whatever rank, and wherever L comes from; it
+// is one of the chordal objective (pose_graph_optimizer.h) with all weights 1, not of chi2.
 #pragma once
 
 #include <functional>
@@ -23,7 +25,7 @@ namespace tutti {
 struct CertificateOptions {
   double certified_gap = 1e-6;  ///< call it the global optimum if (cost - bound) / cost is at most this [1]
   /// Give up where the smallest eigenvalue is below -(this x the largest diagonal entry) [1].
-  double max_shift = 1e-2;
+  double max_shift = 1;
 
   /// Empty if usable, else what is wrong.
   std::string Validate() const;

@@ -31,9 +31,9 @@ enum class GraphObjective { kChi2, kChi2Log };
 enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kGnc };
 
 /// kFile: poses as they are in the graph. kOdometry: spanning tree, odometry edges first. kChordal: linear
-/// relaxation (Carlone et al., ICRA 2015); with least squares (no robust loss) the optimum of the chordal
-/// objective that follows from it, too, and the better result counts. kAuto: whichever of them has the lowest
-/// objective (robust loss included).
+/// relaxation (Carlone et al., ICRA 2015); with least squares (no robust loss), where it leaves large
+/// residuals, the optimum of the chordal objective that follows from it, too, and the better result counts.
+/// kAuto: whichever of them has the lowest objective (robust loss included).
 enum class GraphInit { kAuto, kFile, kOdometry, kChordal };
 
 /// The poses that a solution started from. kChordalRelaxation: of the linear relaxation. kChordalOptimum: of
@@ -86,6 +86,10 @@ struct PoseGraphOptions {
                "stop after this time; 0: no limit (a limit makes the result depend on the machine)",
                Unit("s"), From(0));
   TUTTI_OPTIONS_END;
+
+  /// The chordal optimum is wanted anyway, since CertifyOptimum follows: kChordal starts from it, however
+  /// near the relaxation is.
+  bool will_certify = false;
 
   /// Empty if usable, else what is wrong.
   std::string Validate() const { return OutOfRange(*this, "pose graph: "); }

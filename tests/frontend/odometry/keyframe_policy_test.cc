@@ -153,11 +153,11 @@ TEST_F(KeyframePolicyTest, EachFrameOfOneCameraWhoseViewMovesFarFromFrameToFrame
 TEST_F(KeyframePolicyTest, OneCameraLooksAheadToWhatTheNextFrameWillKeep) {
   // All that the map is sure of is seen, which is little by now.
   for (int l = 0; l < Count() / 2; ++l) map_.RemoveObservation(l, 1);
-  EXPECT_EQ(Need(Fix(0.65)), KeyframeNeed::kNone);
-  EXPECT_EQ(Need(Fix(0.55)), KeyframeNeed::kVeryWeak);
-  options_.min_inliers = static_cast<int>(0.55 * 0.55 * Count());
-  EXPECT_EQ(Need(Fix(0.55)), KeyframeNeed::kThin);
-  EXPECT_EQ(Need(Fix(0.55, 1.2)), KeyframeNeed::kVeryWeak) << "long ago is no frame before";
+  EXPECT_EQ(Need(Fix(0.55)), KeyframeNeed::kNone);
+  EXPECT_EQ(Need(Fix(0.45)), KeyframeNeed::kVeryWeak);
+  options_.min_inliers = static_cast<int>(0.45 * 0.45 * Count());
+  EXPECT_EQ(Need(Fix(0.45)), KeyframeNeed::kThin);
+  EXPECT_EQ(Need(Fix(0.45, 1.2)), KeyframeNeed::kVeryWeak) << "long ago is no frame before";
 }
 
 TEST_F(KeyframePolicyTest, NotInAPlaceFromAnEarlierVisitUnlessTrackingIsAboutToBeLost) {

@@ -15,7 +15,7 @@ constexpr int kMinCellFeatures = 3;
 constexpr int kFewNear = 100;      // near landmarks below which a keyframe is made
 constexpr int kManyNearFree = 70;  // if it would bring more than these
 // One camera from frame to frame. At 10 Hz a car moves its view by 0.02 to 0.06 (0.064 in the fastest 2 %);
-// kitti_00_head keeps less than 0.6 of the landmarks in 2 % of the frames at 10 Hz, and in half at 3 Hz.
+// kitti_00_head keeps less than 0.6 of the landmarks in 2 % of the frames then, and in half at 3.3 Hz.
 constexpr double kFarStep = 0.07;       // that the view moves, of its width: each frame is a keyframe
 constexpr double kLeastKept = 0.5;      // of the landmarks that the frame before saw
 constexpr double kLeastNext = 1.25;     // landmarks left in the next frame, in units of those a pose needs

@@ -11,6 +11,7 @@ namespace tutti {
 /// Why a frame becomes a keyframe; the first one that holds.
 enum class KeyframeNeed {
   kNone,       ///< it does not
+  kThin,       ///< one camera: the next frame would see so few landmarks that it may be lost
   kVeryWeak,   ///< tracking would soon be lost, or lives on grey values alone
   kFewNear,    ///< stereo and depth: few landmarks are near enough to hold the camera's place
   kWeak,       ///< fewer landmarks than OdometryOptions::keyframe_inlier_ratio are left

@@ -17,6 +17,7 @@ namespace {
 
 constexpr int kRamp = 40, kShortestRamp = 10;  // keyframes that a drift of the scale is spread over
 constexpr double kKnown = 0.3;                 // share of landmarks by which a place is one seen before
+constexpr int kRicher = 2;                     // times the features, where landmarks get few
 constexpr int kStartRounds = 2;                // of finding how a rolling shutter's first frame moved
 
 }  // namespace
@@ -64,19 +65,27 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
   return result_;
 }
 
-// With as many features as the pose needs; where those leave a doubt, once more with all.
+// With as many features as the pose needs; where those leave a doubt, once more with all. One camera has
+// landmarks of common features alone: where they get too few for the next frame, it looks for more features.
 std::pair<TrackedFrame, Tracker::Tracked> Odometry::Impl::Look(const InputFrame& input) {
   const int features = localizer_.features();
   const bool few = !input.features && features < options_.features;
-  const std::optional<Tracker> before = few ? std::optional(tracker_) : std::nullopt;
+  const bool enriches = rig_.sensor == Sensor::kMono && !localizer_.Begun() && !input.image.empty() &&
+                        tracker_.state() == TrackingState::kTracking;
+  const std::optional<Tracker> before = few || enriches ? std::optional(tracker_) : std::nullopt;
   TrackedFrame frame = Prepare(input, features);
   Tracker::Tracked tracked = Look(frame);
+  const bool thin = enriches && (!tracked.fix || tracked.need == KeyframeNeed::kThin);
   const bool doubtful =
       few && (!tracked.fix || localizer_.Doubts(*tracked.fix, last().frames_since_keyframe));
-  if (!doubtful) return {std::move(frame), std::move(tracked)};
-  tracker_ = *before;
-  frame = Prepare(input, options_.features);
-  tracked = Look(frame);
+  if (!thin && !doubtful) return {std::move(frame), std::move(tracked)};
+  const Tracker after = std::exchange(tracker_, *before);
+  InputFrame image = input;
+  image.features.reset();
+  TrackedFrame again = Prepare(image, thin ? kRicher * options_.features : options_.features);
+  Tracker::Tracked better = Look(again);
+  if (doubtful || better.fix) return {std::move(again), std::move(better)};
+  tracker_ = after;
   return {std::move(frame), std::move(tracked)};
 }
 

@@ -23,6 +23,7 @@ constexpr double kSurePrediction = 0.5;      // a velocity is likely to hold for
 constexpr double kLeastShare = 0.14;         // of the landmarks in view that must be found again;
 constexpr double kSureShare = 0.2;           // with so many nothing else needs to be tried
 constexpr double kShareForAJump = 0.5;       // and with so many the motion so far may be wrong
+constexpr double kProvisional = 0.8;         // of the inliers that a pose needs, where one camera expects it
 
 // Keyframe with most votes by the landmarks seen (ties: the newest); -1 if there is none.
 int MostVoted(const std::map<int, int>& votes) {
@@ -67,6 +68,11 @@ struct PoseSearch::Contest {
   bool IsWithinReach(const PoseFix& fix) const {
     return !reach || reach->Has(fix.T_camera_world) || fix.Share() >= kShareForAJump;
   }
+  // Soon it is a keyframe, which sees more.
+  bool IsProvisional(const PoseFix& fix, int min_inliers) const {
+    const double enough = std::max(kProvisional * min_inliers, provisional ? provisional->inliers + 1.0 : 0);
+    return fix.inliers >= enough && fix.Share() >= kLeastShare && reach && reach->Has(fix.T_camera_world);
+  }
 
   const Map& map;
   int least_inliers;
@@ -75,6 +81,7 @@ struct PoseSearch::Contest {
   std::vector<Pose> offered = {};      // what would show the same is not settled again
   std::optional<PoseFix> best = {};    // none: no guess has convinced yet
   std::optional<PoseFix> beyond = {};  // one camera: would convince but for the reach, which knows no metres
+  std::optional<PoseFix> provisional = {};  // one camera: would convince but for few inliers, where expected
 };
 
 std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
@@ -107,7 +114,8 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
     if (map.keyframe(k).replaced_by >= 0) continue;
     if (std::find(near.begin(), near.end(), k) == near.end() && settled(k)) break;
   }
-  return contest.best ? std::move(contest.best) : std::move(contest.beyond);
+  if (contest.best) return std::move(contest.best);
+  return contest.beyond || lost ? std::move(contest.beyond) : std::move(contest.provisional);
 }
 
 std::optional<PoseFix> PoseSearch::FindAt(const Map& map, const TrackedFrame& frame, int keyframe) const {
@@ -279,6 +287,8 @@ bool PoseSearch::Offer(std::optional<PoseFix> guess, Contest* contest) const {
     contest->best = std::move(guess);
   } else if (rig_.sensor == Sensor::kMono && contest->IsBetter(*guess, contest->beyond)) {
     contest->beyond = std::move(guess);
+  } else if (rig_.sensor == Sensor::kMono && contest->IsProvisional(*guess, options_.min_inliers)) {
+    contest->provisional = std::move(guess);
   }
   return contest->best && contest->best->Share() >= kSureShare;
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <ostream>
 
@@ -69,6 +70,7 @@ TEST_F(KeyframePolicyTest, WhatGreyValuesAlonePoseIsOneIfItIsSharpAndHasDepth) {
 
 TEST_F(KeyframePolicyTest, WhatOneKeyframeAloneHasSeenDoesNotCount) {
   for (int l = 0; l < Count() / 2; ++l) map_.RemoveObservation(l, 1);
+  std::fill_n(last_.matches.landmarks.begin(), Count() / 2, -1);
   EXPECT_EQ(Need(Fix(0.5)), KeyframeNeed::kNone) << "half of the landmarks are all that is established";
   SeeAllAgain(0);
   for (int l = 0; l < Count() / 2; ++l) map_.RemoveObservation(l, 2);
@@ -78,7 +80,7 @@ TEST_F(KeyframePolicyTest, WhatOneKeyframeAloneHasSeenDoesNotCount) {
 TEST_F(KeyframePolicyTest, SoonAfterAKeyframeOnlyIfTrackingIsAboutToBeLost) {
   last_.frames_since_keyframe = 0;
   EXPECT_EQ(Need(Fix(0.7)), KeyframeNeed::kNone);
-  EXPECT_EQ(Need(Fix(0.3)), KeyframeNeed::kVeryWeak);
+  EXPECT_EQ(Need(Fix(0.35)), KeyframeNeed::kVeryWeak);
   last_.frames_since_keyframe = 1;
   EXPECT_EQ(Need(Fix(0.7)), KeyframeNeed::kWeak) << "keyframe_min_frames is 2";
 }
@@ -91,12 +93,12 @@ TEST_F(KeyframePolicyTest, FewInliersAreFewWhateverTheirShare) {
 TEST_F(KeyframePolicyTest, AFrameThatSeesNothingIsVeryWeak) {
   PoseFix fix(Nothing(0.1));
   fix.reference = 0;
-  EXPECT_EQ(Need(fix), KeyframeNeed::kVeryWeak);
+  EXPECT_EQ(Need(fix), KeyframeNeed::kThin);
   EXPECT_EQ(Need(fix, Sensor::kStereo), KeyframeNeed::kVeryWeak);
 }
 
 TEST_F(KeyframePolicyTest, NeverWithoutTheDepthThatTheSensorShouldHave) {
-  PoseFix fix = Fix(0.3);
+  PoseFix fix = Fix(0.35);
   ASSERT_EQ(Need(fix, Sensor::kRgbd), KeyframeNeed::kVeryWeak);
   auto colour_alone = std::make_shared<FrameFeatures>(*fix.frame.features);
   colour_alone->has_depth = false;
@@ -130,17 +132,39 @@ TEST_F(KeyframePolicyTest, WithDepthWhenAPartOfTheImageIsUncovered) {
 
 TEST_F(KeyframePolicyTest, AfterAnIntervalIfTheCameraMoved) {
   EXPECT_EQ(Need(Fix(1, 1.5)), KeyframeNeed::kNone) << "it stands";
-  last_.T_camera_world = Moved(0.5, 0).Inverse();
+  last_.T_camera_world = Moved(0.3, 0).Inverse();
   EXPECT_EQ(Need(Fix(1, 1.5)), KeyframeNeed::kInterval);
   EXPECT_EQ(Need(Fix(1, 0.9)), KeyframeNeed::kNone);
   EXPECT_EQ(Need(Fix(1, std::numeric_limits<double>::quiet_NaN())), KeyframeNeed::kNone);
+}
+
+TEST_F(KeyframePolicyTest, EachFrameOfOneCameraWhoseViewMovesFarFromFrameToFrame) {
+  PoseFix fix = Fix(1);
+  const double width_rad = camera_.width / camera_.fx;
+  fix.T_camera_world = Moved(0, 0, 0.06 * width_rad).Inverse();
+  EXPECT_EQ(Need(fix), KeyframeNeed::kNone);
+  fix.T_camera_world = Moved(0, 0, 0.08 * width_rad).Inverse();
+  EXPECT_EQ(Need(fix), KeyframeNeed::kVeryWeak);
+  EXPECT_EQ(Need(fix, Sensor::kRgbd), KeyframeNeed::kNone) << "depth makes landmarks of one view";
+  fix.T_camera_world = Moved(0.08 * width_rad * map_.MedianDepth(1), 0).Inverse();
+  EXPECT_EQ(Need(fix), KeyframeNeed::kVeryWeak);
+}
+
+TEST_F(KeyframePolicyTest, OneCameraLooksAheadToWhatTheNextFrameWillKeep) {
+  // All that the map is sure of is seen, which is little by now.
+  for (int l = 0; l < Count() / 2; ++l) map_.RemoveObservation(l, 1);
+  EXPECT_EQ(Need(Fix(0.55)), KeyframeNeed::kNone);
+  EXPECT_EQ(Need(Fix(0.45)), KeyframeNeed::kVeryWeak);
+  options_.min_inliers = static_cast<int>(0.45 * 0.45 * Count());
+  EXPECT_EQ(Need(Fix(0.45)), KeyframeNeed::kThin);
+  EXPECT_EQ(Need(Fix(0.45, 1.2)), KeyframeNeed::kVeryWeak) << "long ago is no frame before";
 }
 
 TEST_F(KeyframePolicyTest, NotInAPlaceFromAnEarlierVisitUnlessTrackingIsAboutToBeLost) {
   for (int i = 0; i < 12; ++i) SeeAllAgain(20);
   last_.newest_keyframe = 13;
   EXPECT_EQ(Need(Fix(0.7, 21)), KeyframeNeed::kNone);
-  EXPECT_EQ(Need(Fix(0.3, 21)), KeyframeNeed::kVeryWeak);
+  EXPECT_EQ(Need(Fix(0.35, 21)), KeyframeNeed::kVeryWeak);
   EXPECT_EQ(Need(Fix(0.7, 9)), KeyframeNeed::kWeak) << "that is no earlier visit";
 }
 

@@ -142,6 +142,35 @@ TEST_F(PoseSearchTest, AFewLandmarksDoNotCarryTheCameraFartherThanItCanMove) {
   EXPECT_TRUE(find(Sensor::kStereo, last)) << "all landmarks say so";
 }
 
+// The map is thin, and so much of it is new that too few landmarks are left; they are where they should be.
+TEST_F(PoseSearchTest, OneCameraIsFoundByAFewLandmarksLessWhereItsMotionLeads) {
+  for (int l = 60; l < map_.LandmarkCount(); ++l) map_.RemoveLandmark(l);
+  const Pose there = Moved(0, 0.1);
+  LastFrame last = AtFirstKeyframe();
+  last.matches.landmarks = map_.keyframe(0).landmarks;
+  last.velocity = LogSE3(there.Inverse()) / 0.1;
+  const auto find = [&](int known, Sensor sensor, bool lost) {
+    TrackedFrame frame = Frame(there, 0.1);
+    const auto seen = std::make_shared<FrameFeatures>(*frame.features);
+    seen->descriptors = seen->descriptors.clone();
+    cv::RNG(77).fill(seen->descriptors.rowRange(known, seen->descriptors.rows), cv::RNG::UNIFORM, 0, 256);
+    frame.features = seen;
+    return PoseSearch(options_, Rig(sensor)).Find(map_, frame, last, lost);
+  };
+  ASSERT_TRUE(find(25, Sensor::kMono, false));
+  EXPECT_FALSE(find(18, Sensor::kMono, false)) << "the motion is not sure";
+  last.steady = true;
+  const auto fix = find(18, Sensor::kMono, false);
+  ASSERT_TRUE(fix);
+  EXPECT_LT(fix->inliers, options_.min_inliers);
+  EXPECT_LT(Distance(fix->T_camera_world, there.Inverse()), 1e-4);
+  EXPECT_FALSE(find(15, Sensor::kMono, false)) << "few are few";
+  EXPECT_FALSE(find(18, Sensor::kMono, true)) << "it was lost";
+  EXPECT_FALSE(find(18, Sensor::kStereo, false));
+  last.velocity = LogSE3(Moved(0, 1).Inverse()) / 0.1;
+  EXPECT_FALSE(find(18, Sensor::kMono, false)) << "it is expected elsewhere";
+}
+
 TEST_F(PoseSearchTest, RefineDropsWhatDoesNotFit) {
   const Pose T_world_camera = Moved(0.1, 0.05, 0.01);
   const TrackedFrame frame = Frame(Pose(), 0.1);

@@ -162,8 +162,9 @@ struct RunResult {
   double peak_memory_mb = 0;
   double stereo_row_error_px = 0, stereo_matches = 0;
   std::optional<LensFound> lens;           ///< mono, with self-calibration
-  std::optional<ClocksFound> clocks;       ///< RGB-D, where readout_s and depth_delay_s are not told
+  std::optional<ClocksFound> clocks;       ///< RGB-D
   std::optional<ClocksFound> clocks_used;  ///< measured, and put into config; standard deviation 0: not
+  int begun_anew = 0;                      ///< so often, with what was measured of the clocks
   std::optional<HeightFound> height;       ///< mono, where the ground was seen
 
   std::filesystem::path folder;  ///< where everything was written: RunRequest::out, or "unfinished" inside

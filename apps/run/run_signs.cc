@@ -92,7 +92,7 @@ Value ClocksOff(const RunResult& r) {
   if (!r.clocks) return std::nullopt;
   const auto off = [](double value, double sigma) { return std::max(0.0, std::abs(value) - 3 * sigma); };
   return 1e3 * std::max(off(r.clocks->readout_s, r.clocks->readout_sigma_s),
-                        off(r.clocks->depth_delay_s, r.clocks->depth_delay_sigma_s));
+                        off(r.clocks->depth_delay_s - r.rig.depth_delay_s, r.clocks->depth_delay_sigma_s));
 }
 
 // At the middle of the image's left or right edge.

@@ -48,7 +48,9 @@ void BeginAnew(const RunRequest& request, const ClocksFound& found, const RunRes
                   1e3 * found.depth_delay_s);
   }
   if (!request.quiet) internal::Say("measured: %s; the run begins anew with that", text.data());
+  const int begun_anew = result.begun_anew + 1;
   result = blank;
+  result.begun_anew = begun_anew;
   result.config.dataset = options;
   result.clocks_used = clocks;
   dataset = OpenDataset(request.dataset, options);
@@ -175,14 +177,18 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
       internal::Say("warning: the calibration can't be right: %s; %s", f.measured.c_str(), f.advice.c_str());
     }
   }
-  std::unique_ptr<SlamRun> run;
+  const RunResult blank = result;
+  const auto begin = [&] {
+    return std::make_unique<SlamRun>(request, *dataset, odometry ? &*odometry : nullptr, folder.path(),
+                                     result);
+  };
+  std::unique_ptr<SlamRun> run = begin();
   Attempts attempts;
   attempts.Try([&] {
-    const RunResult blank = result;
-    while (!run || run->clocks()) {
-      if (run) BeginAnew(request, *run->clocks(), blank, dataset, result);
-      run = std::make_unique<SlamRun>(request, *dataset, odometry ? &*odometry : nullptr, folder.path(),
-                                      result);
+    run->TrackAll();
+    while (run->clocks()) {
+      BeginAnew(request, *run->clocks(), blank, dataset, result);
+      run = begin();
       run->TrackAll();
     }
   });

@@ -15,9 +15,10 @@ namespace tutti {
 namespace {
 
 constexpr std::size_t kAskClocks = 10;  // frames
-constexpr double kSureDelay = 7e-4;     // the same; half of how far off it may be is none that scatter shows
+constexpr int kMostBeginnings = 4;
 constexpr double kSureClock = 1e-3;     // standard deviation with which a run begins anew [s]
 constexpr double kClockMatters = 4e-3;  // smaller times make little difference [s]
+constexpr double kSureAgain = 7e-4, kMattersAgain = 2e-3;  // the same, of a second look at the delay [s]
 constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry without loops may follow
 
 }  // namespace
@@ -124,21 +125,23 @@ void SlamRun::TrackAll() {
 
 bool SlamRun::KnowsClocks() {
   const bool anew = dataset_.FrameSupply() == Supply::kStored && !request_.realtime && !request_.map &&
-                    !request_.resume && given_ == nullptr && slam_->odometry() != nullptr;
+                    !request_.resume && given_ == nullptr && slam_->odometry() != nullptr &&
+                    result_.begun_anew < kMostBeginnings;
   if (!anew || so_far_.next % kAskClocks != 0) return false;
   const std::optional<ClocksFound> found = slam_->odometry()->Report().clocks;
   if (!found) return false;
-  const auto sure = [](double value, double sigma, double most) {
-    return sigma < most && std::abs(value) > kClockMatters ? value : 0.0;
-  };
+  const bool measured = result_.clocks_used && result_.clocks_used->depth_delay_sigma_s > 0;
   ClocksFound clocks = *found;
-  clocks.readout_s = sure(found->readout_s, found->readout_sigma_s, kSureClock);
-  // A shutter that rolls bends what depth is compared with.
-  const bool straight = result_.rig.readout_s > 0 || found->readout_sigma_s < kSureClock;
-  clocks.depth_delay_s = straight && clocks.readout_s == 0
-                             ? sure(found->depth_delay_s, found->depth_delay_sigma_s, kSureDelay)
-                             : 0.0;
-  if (clocks.readout_s <= 0 && clocks.depth_delay_s == 0) return false;
+  if (!(found->readout_sigma_s < kSureClock && found->readout_s > kClockMatters)) clocks.readout_s = 0;
+  // A shutter that rolls bends what depth is compared with, and depth of another time the poses that it is
+  // compared with: a second look is better.
+  const bool straight =
+      clocks.readout_s == 0 && (result_.rig.readout_s > 0 || found->readout_sigma_s < kSureClock);
+  const double off = std::abs(found->depth_delay_s - result_.rig.depth_delay_s);
+  const bool sure = measured ? found->depth_delay_sigma_s < kSureAgain && off > kMattersAgain
+                             : found->depth_delay_sigma_s < kSureClock && off > kClockMatters;
+  if (!straight || !sure || (!measured && result_.rig.depth_delay_s != 0)) clocks.depth_delay_s = 0;
+  if (clocks.readout_s == 0 && clocks.depth_delay_s == 0) return false;
   clocks_ = clocks;
   return true;
 }

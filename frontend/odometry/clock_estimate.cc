@@ -53,7 +53,7 @@ std::pair<double, double> Measurements::Mean() const {
 
 ClockEstimate::ClockEstimate(const CameraRig& rig, const OdometryOptions& options)
     : readout_wanted_(rig.sensor == Sensor::kRgbd && rig.readout_s == 0),
-      delay_wanted_(rig.sensor == Sensor::kRgbd && rig.depth_delay_s == 0),
+      measures_(rig.sensor == Sensor::kRgbd),
       shutter_(rig),
       camera_(rig.camera),
       inverse_sigma_(options.rgbd_inverse_sigma) {}
@@ -64,8 +64,8 @@ void ClockEstimate::Break() {
 }
 
 std::optional<ClocksFound> ClockEstimate::Found() const {
-  if (!readout_wanted_ && !delay_wanted_) return std::nullopt;
-  ClocksFound found;  // infinite standard deviations where the rig tells one of both
+  if (!measures_) return std::nullopt;
+  ClocksFound found;  // an infinite standard deviation of the readout where the rig tells it
   std::tie(found.readout_s, found.readout_sigma_s) = readout_.Mean();
   std::tie(found.depth_delay_s, found.depth_delay_sigma_s) = delay_.Mean();
   return found;
@@ -73,7 +73,7 @@ std::optional<ClocksFound> ClockEstimate::Found() const {
 
 void ClockEstimate::Add(const Map& map, const TrackedFrame& seen, const PoseFix& fix, const LastFrame& last,
                         int keyframe) {
-  if (!readout_wanted_ && !delay_wanted_) return;
+  if (!measures_) return;
   if (!last.step || fix.by_grey) {
     Break();
     return;
@@ -89,7 +89,7 @@ void ClockEstimate::Add(const Map& map, const TrackedFrame& seen, const PoseFix&
   }
   steps_.push_back({*last.step, dt, seen.features->depth_later_s, seen.features->depth_grid});
   if (steps_.size() > 4) steps_.pop_front();
-  if (delay_wanted_ && steps_.size() == 4) MeasureDelay();
+  if (steps_.size() == 4) MeasureDelay();
   if (readout_wanted_) before_ = fix;
   keyframe_before_ = keyframe;
 }

@@ -55,7 +55,7 @@ class ClockEstimate {
   void MeasureReadout(const Map& map, const PoseFix& fix, const Vector6d& motion);
   void MeasureDelay();
 
-  bool readout_wanted_, delay_wanted_;
+  bool readout_wanted_, measures_;
   RollingShutter shutter_;
   PinholeCamera camera_;
   double inverse_sigma_;

@@ -12,7 +12,7 @@ namespace tutti {
 namespace {
 
 constexpr int kAlignments = 15;
-constexpr int kFewest = 200;         // points that find a surface
+constexpr int kFewestAligned = 200;   // points that find a surface
 constexpr double kSteep = 0.25;      // cosine between ray and normal, below which a surface is too slanted
 constexpr double kOneSurface = 0.1;  // neighbours whose inverse depths differ by more are of two [1/m]
 constexpr double kInSigmas = 9;      // square of the distance from a surface at which Huber's loss begins
@@ -101,7 +101,7 @@ std::optional<DepthRotation> RotationByDepth(const RollingShutter& shutter, cons
       gradient += weight * r * j;
       ++found;
     }
-    if (found < kFewest) return std::nullopt;
+    if (found < kFewestAligned) return std::nullopt;
     hessian += 1e-6 * Matrix6d::Identity();
     const Vector6d step = internal::SolveLdlt(Matrix6d(hessian), Vector6d(-gradient));
     T = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * T;

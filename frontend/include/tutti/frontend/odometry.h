@@ -92,8 +92,8 @@ struct FrameView {
   std::vector<SeenLandmark> landmarks;
 };
 
-/// What the images of an RGB-D camera that is taken to have a global shutter, and depth of the same time,
-/// told of both. Infinite standard deviations: it has not turned enough.
+/// What the images of an RGB-D camera told of its clocks. Infinite standard deviations: it has not turned
+/// enough, or the rig tells the readout.
 struct ClocksFound {
   double readout_s = 0, readout_sigma_s = 0;          ///< CameraRig::readout_s, and its standard deviation
   double depth_delay_s = 0, depth_delay_sigma_s = 0;  ///< CameraRig::depth_delay_s
@@ -104,7 +104,7 @@ struct OdometryReport {
   std::map<std::string, double> stage_ms;  ///< milliseconds by stage ("extract", "track", "local_ba", ...)
   double stereo_row_error_px = 0;          ///< stereo: median row difference over matches [px]
   double stereo_matches = 0;               ///< stereo: matches of the median frame
-  std::optional<ClocksFound> clocks;       ///< RGB-D, where the rig tells neither
+  std::optional<ClocksFound> clocks;       ///< RGB-D
   std::optional<LensFound> lens;           ///< one camera, by self-calibration; none with lens_sigma 0
   std::optional<HeightFound>
       height;  ///< one camera above the ground; none: no ground was seen, or looked for

@@ -111,6 +111,7 @@ std::vector<StampedFile> ReadList(const fs::path& folder, const char* name, Stam
 
 std::vector<double> StampsOf(const std::vector<StampedFile>& files) {
   std::vector<double> stamps;
+  stamps.reserve(files.size());
   for (const StampedFile& file : files) stamps.push_back(file.stamp_s);
   return stamps;
 }
@@ -118,6 +119,7 @@ std::vector<double> StampsOf(const std::vector<StampedFile>& files) {
 // What the clocks of colour and depth say of frames. `depth`: the stamp of each one's depth image, NaN: none.
 void SetClocks(std::vector<FrameFiles>& frames, const std::vector<double>& depth) {
   std::vector<double> stamps, own;
+  stamps.reserve(frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) {
     stamps.push_back(frames[i].stamp_s);
     if (std::isfinite(depth[i]) && (own.empty() || depth[i] > own.back())) own.push_back(depth[i]);

@@ -54,9 +54,10 @@ void RollingShutter::TakeDepth(const FrameFeatures& seen, const Vector6d& motion
   }
   if (!seen.depth_grid) return;
   auto grid = std::make_shared<DepthGrid>(*seen.depth_grid);
+  auto element = grid->inverse_depth.begin();
   for (int r = 0; r < grid->Rows(); ++r) {
     for (int c = 0; c < grid->columns; ++c) {
-      float& inverse = grid->inverse_depth[static_cast<std::size_t>(r * grid->columns + c)];
+      float& inverse = *element++;
       const double first = inverse != 0 ? 1 / std::abs(double(inverse)) : first_m;
       inverse = static_cast<float>(
           InverseDepth(depth, camera_.Unproject(grid->PixelOf(r, c)), first, T_taken_row, 1));

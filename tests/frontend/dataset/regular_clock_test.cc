@@ -40,6 +40,7 @@ TEST(RegularClock, TakesTheJitterOutOfStampsAcrossGaps) {
 
 TEST(RegularClock, FollowsAClockThatDrifts) {
   std::vector<double> times;
+  times.reserve(300);
   for (int k = 0; k < 300; ++k) times.push_back(k * kTick * (1 + 1e-4 * k));
   std::vector<double> stamps = times;
   for (std::size_t k = 0; k < stamps.size(); ++k) stamps[k] += k % 2 == 0 ? 0.004 : -0.004;

@@ -18,7 +18,6 @@ DepthGrid See(const std::vector<Eigen::Vector4d>& planes, const Pose& T_camera_w
   DepthGrid grid;
   grid.step = 8;
   grid.columns = 40;
-  grid.inverse_depth.resize(std::size_t{40} * 30);
   const Pose T_world_camera = T_camera_world.Inverse();
   for (int r = 0; r < 30; ++r) {
     for (int c = 0; c < 40; ++c) {
@@ -31,8 +30,7 @@ DepthGrid See(const std::vector<Eigen::Vector4d>& planes, const Pose& T_camera_w
       }
       const double noise =
           0.2 * kInverseSigma * std::sin(12.9898 * (r * 40 + c) + 4.1 * T_camera_world.translation.x());
-      grid.inverse_depth[static_cast<std::size_t>(r * 40 + c)] =
-          nearest > 0 ? static_cast<float>(1 / nearest + noise) : 0.0F;
+      grid.inverse_depth.push_back(nearest > 0 ? static_cast<float>(1 / nearest + noise) : 0.0F);
     }
   }
   return grid;

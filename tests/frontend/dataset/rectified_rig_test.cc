@@ -101,8 +101,10 @@ TEST(RightCamera, ThatCantBeUsedIsRefusedByItsKey) {
               HasSubstr("camera.right: the principal point"));
   EXPECT_THAT(problem([](DatasetOptions& o) { o.T_right_left = {}; }), HasSubstr("T_right_left is missing"));
   EXPECT_THAT(problem([](DatasetOptions& o) { o.right.reset(); }), HasSubstr("needs the right camera's fx"));
-  for (const auto& [place, value] : {std::pair(0, 2.0), {0, -1.0}, {15, 0.0}})
-    EXPECT_THAT(problem([&](DatasetOptions& o) { o.T_right_left[static_cast<std::size_t>(place)] = value; }),
+  for (const auto& entry : {std::pair(0, 2.0), {0, -1.0}, {15, 0.0}})
+    EXPECT_THAT(problem([&](DatasetOptions& o) {
+                  o.T_right_left[static_cast<std::size_t>(entry.first)] = entry.second;
+                }),
                 HasSubstr("is not a rigid transform"));
   EXPECT_THAT(problem([](DatasetOptions& o) { o.T_right_left[3] = std::nan(""); }),
               HasSubstr("T_right_left"));

@@ -251,8 +251,8 @@ const std::vector<SignKind>& SignKinds() {
        "check the distortion's model and coefficients", LensOff},
       {"clocks_off", "ms",
        "depth cameras: how far, at least, readout or depth's delay are from what the run took them to be "
-       "(less 3 "
-       "standard deviations)",
+       "(less "
+       "3 standard deviations)",
        kAbove, 6, kNever, "rows, or depth, are at least %s ms off the time that they are taken to be of",
        "set camera.readout_s and camera.depth_delay_s to what clocks in summary.json says", ClocksOff},
       {"loops_refused", "share", "loops that were recognised and contradict the map, if there are 3", kAbove,

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <utility>
+#include <vector>
 
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"
@@ -27,7 +28,7 @@ namespace {
 
 // Sets what was found of the camera's clocks for a run that begins anew.
 void BeginAnew(const RunRequest& request, const ClocksFound& found, const RunResult& blank,
-               std::unique_ptr<Dataset>& dataset, RunResult& result) {
+               std::vector<std::unique_ptr<Dataset>>& datasets, RunResult& result) {
   ClocksFound clocks = result.clocks_used.value_or(ClocksFound());
   DatasetOptions options = result.config.dataset;
   std::array<char, 120> text{};
@@ -53,8 +54,8 @@ void BeginAnew(const RunRequest& request, const ClocksFound& found, const RunRes
   result.begun_anew = begun_anew;
   result.config.dataset = options;
   result.clocks_used = clocks;
-  dataset = OpenDataset(request.dataset, options);
-  result.rig = dataset->Rig();
+  datasets.push_back(OpenDataset(request.dataset, options));
+  result.rig = datasets.back()->Rig();
   for (const auto& observer : request.observers) observer->OnRestart();
 }
 
@@ -143,8 +144,9 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
     odometry.emplace(*request.odometry, request.dataset, result.config.dataset);
     result.config = FollowingConfig(result.config);
   }
-  std::unique_ptr<Dataset> dataset =
-      odometry ? odometry->Open() : OpenDataset(request.dataset, result.config.dataset);
+  std::vector<std::unique_ptr<Dataset>> datasets;  // of each beginning, as long as its run is there
+  datasets.push_back(odometry ? odometry->Open() : OpenDataset(request.dataset, result.config.dataset));
+  const Dataset* const dataset = datasets.back().get();
   result.rig = dataset->Rig();
   if (auto& camera = result.config.dataset.camera; camera && camera->width == 0) {  // of a pipe
     camera->width = result.rig.camera.width;
@@ -179,15 +181,15 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   }
   const RunResult blank = result;
   const auto begin = [&] {
-    return std::make_unique<SlamRun>(request, *dataset, odometry ? &*odometry : nullptr, folder.path(),
-                                     result);
+    return std::make_unique<SlamRun>(request, *datasets.back(), odometry ? &*odometry : nullptr,
+                                     folder.path(), result);
   };
   std::unique_ptr<SlamRun> run = begin();
   Attempts attempts;
   attempts.Try([&] {
     run->TrackAll();
     while (run->clocks()) {
-      BeginAnew(request, *run->clocks(), blank, dataset, result);
+      BeginAnew(request, *run->clocks(), blank, datasets, result);
       run = begin();
       run->TrackAll();
     }

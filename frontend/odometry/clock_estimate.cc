@@ -15,10 +15,9 @@
 namespace tutti {
 namespace {
 
-constexpr std::size_t kMostViews =
-    1;                               //    // slower turning makes landmarks as a global shutter would [rad/s]
-constexpr double kFastest = 1.5;     // beyond which what is bent is far from linear [rad/s]
-constexpr double kFast = 0.5;        // and faster turning bends them [rad/s]
+constexpr std::size_t kMostViews = 1;  // of a landmark: poses and points that were adjusted absorb the rest
+constexpr double kFastest = 1.5;       // turning beyond which what is bent is far from linear [rad/s]
+constexpr double kFast = 0.5;        // difference of two turning rates that bends a landmark's pixel [rad/s]
 constexpr double kTurnChange = 0.4;  // of the rate from frame to frame that tells a time [rad/s]
 constexpr float kWide = 3;           // factor of the radius in which landmarks are looked for
 constexpr int kFewestLandmarks = 60;
@@ -125,13 +124,13 @@ void ClockEstimate::MeasureReadout(const Map& map, const PoseFix& fix, const Vec
            made->second.tail<3>().norm() < kFastest;
   };
   if (!(motion.tail<3>().norm() < kFastest)) return;
-  std::vector<int> resting;
-  std::copy_if(fix.visible.begin(), fix.visible.end(), std::back_inserter(resting), moves_else);
-  if (static_cast<int>(resting.size()) < kFewestLandmarks) return;
+  std::vector<int> landmarks;
+  std::copy_if(fix.visible.begin(), fix.visible.end(), std::back_inserter(landmarks), moves_else);
+  if (static_cast<int>(landmarks.size()) < kFewestLandmarks) return;
   const FrameFeatures& features = *fix.frame.features;
   FrameMatches matches{&features, std::vector<int>(features.size(), -1)};
   std::vector<int> visible;
-  if (MatchToLandmarks(map, camera_, fix.T_camera_world, resting, kWide, &matches, &visible) <
+  if (MatchToLandmarks(map, camera_, fix.T_camera_world, landmarks, kWide, &matches, &visible) <
       kFewestLandmarks)
     return;
   struct Seen {

@@ -1,7 +1,5 @@
 #include "apps/run/runner.h"
 
-#include <array>
-#include <cstdio>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/run/camera_clocks.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
@@ -25,39 +24,6 @@ namespace tutti {
 namespace fs = std::filesystem;
 
 namespace {
-
-// Sets what was found of the camera's clocks for a run that begins anew.
-void BeginAnew(const RunRequest& request, const ClocksFound& found, const RunResult& blank,
-               std::vector<std::unique_ptr<Dataset>>& datasets, RunResult& result) {
-  ClocksFound clocks = result.clocks_used.value_or(ClocksFound());
-  DatasetOptions options = result.config.dataset;
-  std::array<char, 120> text{};
-  if (found.readout_s > 0) {
-    clocks.readout_s = found.readout_s;
-    clocks.readout_sigma_s = found.readout_sigma_s;
-    // The option is of the rows as they were taken, before rectification.
-    options.readout_s = found.readout_s;
-    const double rectified = OpenDataset(request.dataset, options)->Rig().readout_s;
-    options.readout_s *= found.readout_s / rectified;
-    std::snprintf(text.data(), text.size(), "the camera reads its rows in %.1f ms (camera.readout_s)",
-                  1e3 * found.readout_s);
-  } else {
-    clocks.depth_delay_s = options.depth_delay_s = found.depth_delay_s;
-    clocks.depth_delay_sigma_s = found.depth_delay_sigma_s;
-    std::snprintf(text.data(), text.size(),
-                  "depth is %.1f ms older than its time stamps say (camera.depth_delay_s)",
-                  1e3 * found.depth_delay_s);
-  }
-  if (!request.quiet) internal::Say("measured: %s; the run begins anew with that", text.data());
-  const int begun_anew = result.begun_anew + 1;
-  result = blank;
-  result.begun_anew = begun_anew;
-  result.config.dataset = options;
-  result.clocks_used = clocks;
-  datasets.push_back(OpenDataset(request.dataset, options));
-  result.rig = datasets.back()->Rig();
-  for (const auto& observer : request.observers) observer->OnRestart();
-}
 
 // The path that leads there from any folder.
 std::string Absolute(const fs::path& path) {
@@ -189,7 +155,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   attempts.Try([&] {
     run->TrackAll();
     while (run->clocks()) {
-      BeginAnew(request, *run->clocks(), blank, datasets, result);
+      datasets.push_back(BeginAnew(request, *run->clocks(), blank, result));
       run = begin();
       run->TrackAll();
     }

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/run/camera_clocks.h"
 #include "apps/run/interrupt.h"
 #include "apps/slam/map_state.h"
 #include "apps/slam/trajectory_correction.h"
@@ -14,11 +15,7 @@
 namespace tutti {
 namespace {
 
-constexpr std::size_t kAskClocks = 10;  // frames
-constexpr int kMostBeginnings = 4;
-constexpr double kSureClock = 1e-3;     // standard deviation with which a run begins anew [s]
-constexpr double kClockMatters = 4e-3;  // smaller times make little difference [s]
-constexpr double kSureAgain = 7e-4, kMattersAgain = 2e-3;  // the same, of a second look at the delay [s]
+constexpr std::size_t kAskClocks = 10;      // frames
 constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry without loops may follow
 
 }  // namespace
@@ -26,6 +23,11 @@ constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry wit
 template <class Archive>
 void State(Archive& archive, StampedPose& pose) {
   archive(pose.stamp_s, pose.pose);
+}
+
+template <class Archive>
+void State(Archive& archive, ClocksFound& clocks) {
+  archive(clocks.readout_s, clocks.readout_sigma_s, clocks.depth_delay_s, clocks.depth_delay_sigma_s);
 }
 
 template <class Archive>
@@ -57,6 +59,8 @@ SlamRun::SlamRun(const RunRequest& request, const Dataset& dataset, const GivenO
     GoOnIn(*request.map);
   } else {
     slam_ = std::make_unique<SlamSystem>(Watched(result.config, request), dataset.Rig(), Recorder());
+    before_.wall_s = result.wall_s;  // of a run that begins anew
+    before_.cpu_s = result.cpu_s;
   }
   for (const MapSession& session : slam_->Sessions()) session_offsets_.push_back(session.frame_offset);
   if (request.checkpoint_s) checkpoints_.emplace(out / kCheckpoint, *request.checkpoint_s);
@@ -103,7 +107,10 @@ void SlamRun::TrackAll() {
       status += "  loops " + std::to_string(CountAccepted(slam_->loops())) + "/" +
                 std::to_string(slam_->loops().size());
     progress.Update(++so_far_.next, status);
-    if (KnowsClocks()) return;
+    if (!KnowsClocks()) continue;
+    result_.wall_s = WallSeconds();
+    result_.cpu_s = CpuSeconds();
+    return;
   }
   result_.interrupted = InterruptGuard::Requested();
   if (checkpoints_) EndCheckpoints(progress);
@@ -125,25 +132,10 @@ void SlamRun::TrackAll() {
 
 bool SlamRun::KnowsClocks() {
   const bool anew = dataset_.FrameSupply() == Supply::kStored && !request_.realtime && !request_.map &&
-                    !request_.resume && given_ == nullptr && slam_->odometry() != nullptr &&
-                    result_.begun_anew < kMostBeginnings;
+                    !request_.resume && given_ == nullptr && slam_->odometry() != nullptr;
   if (!anew || so_far_.next % kAskClocks != 0) return false;
-  const std::optional<ClocksFound> found = slam_->odometry()->Report().clocks;
-  if (!found) return false;
-  const bool measured = result_.clocks_used && result_.clocks_used->depth_delay_sigma_s > 0;
-  ClocksFound clocks = *found;
-  if (!(found->readout_sigma_s < kSureClock && found->readout_s > kClockMatters)) clocks.readout_s = 0;
-  // A shutter that rolls bends what depth is compared with, and depth of another time the poses that it is
-  // compared with: a second look is better.
-  const bool straight =
-      clocks.readout_s == 0 && (result_.rig.readout_s > 0 || found->readout_sigma_s < kSureClock);
-  const double off = std::abs(found->depth_delay_s - result_.rig.depth_delay_s);
-  const bool sure = measured ? found->depth_delay_sigma_s < kSureAgain && off > kMattersAgain
-                             : found->depth_delay_sigma_s < kSureClock && off > kClockMatters;
-  if (!straight || !sure || (!measured && result_.rig.depth_delay_s != 0)) clocks.depth_delay_s = 0;
-  if (clocks.readout_s == 0 && clocks.depth_delay_s == 0) return false;
-  clocks_ = clocks;
-  return true;
+  if (const auto found = slam_->odometry()->Report().clocks) clocks_ = SureClocks(*found, result_);
+  return clocks_.has_value();
 }
 
 void SlamRun::Count() {
@@ -378,7 +370,7 @@ void SlamRun::State(Archive& archive) {
   archive(so_far_, planted_, live, alone_last, has_alone, collected);
   archive(result_.frames_lost, result_.frames_without_mask, result_.frames_without_depth, result_.bad,
           result_.bad_depth, result_.lost, result_.found, result_.frame_ms, result_.latency_ms,
-          result_.frame_inliers, result_.frames_by_grey_values);
+          result_.frame_inliers, result_.frames_by_grey_values, result_.clocks_used, result_.begun_anew);
   if constexpr (Archive::kReading) {
     if (has_alone) resumed_alone_ = alone_last;
     resumed_live_ = std::move(live);

@@ -152,7 +152,7 @@ class SlamRun {
   Span::Clock::time_point begin_ = Span::Clock::now();
   internal::Stopwatch watch_;
   double cpu_begin_ = ProcessCpuSeconds();
-  RunProgress so_far_, before_;                // before_: when this process began
+  RunProgress so_far_, before_;                // before_: when this process, or this beginning, began
   Trajectory resumed_live_;                    // on its way into live_
   std::unique_ptr<OdometryAlone> alone_;       // from before the detector first changed anything
   std::optional<std::int64_t> resumed_alone_;  // its last frame, on the way into alone_

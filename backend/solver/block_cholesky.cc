@@ -59,8 +59,9 @@ bool BlockCholesky<N>::Factorise(const std::vector<Block>& diagonal, const std::
 }
 
 template <int N>
-void BlockCholesky<N>::Solve(Eigen::VectorXd& b) const {
-  Eigen::VectorXd y(b.size());
+template <int Sides>
+void BlockCholesky<N>::SolveInPlace(Eigen::Map<Columns<Sides>> b) const {
+  Columns<Sides> y(b.rows(), b.cols());
   for (std::size_t k = 0; k < size(); ++k) Segment(y, k) = Segment(b, order_[k]);
   for (std::size_t k = 0; k < size(); ++k) {
     Segment(y, k) = (diagonal_inverse_[k] * Segment(y, k)).eval();
@@ -175,5 +176,11 @@ template class BlockCholesky<3>;
 template class BlockCholesky<4>;
 template class BlockCholesky<6>;
 template class BlockCholesky<7>;
+template void BlockCholesky<3>::SolveInPlace(Eigen::Map<Columns<1>>) const;
+template void BlockCholesky<3>::SolveInPlace(Eigen::Map<Columns<5>>) const;
+template void BlockCholesky<4>::SolveInPlace(Eigen::Map<Columns<1>>) const;
+template void BlockCholesky<4>::SolveInPlace(Eigen::Map<Columns<6>>) const;
+template void BlockCholesky<6>::SolveInPlace(Eigen::Map<Columns<1>>) const;
+template void BlockCholesky<7>::SolveInPlace(Eigen::Map<Columns<1>>) const;
 
 }  // namespace tutti::internal

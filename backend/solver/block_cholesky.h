@@ -18,8 +18,8 @@ namespace tutti::internal {
 
 /// One diagonal block for each unknown, one block below the diagonal for each pair of them that edges join.
 struct BlockPattern {
-  int unknowns = 0;          ///< before what counts them
-  std::vector<int> unknown;  ///< parallel to nodes; -1: does not move
+  int unknowns = 0;                        ///< before what counts them
+  std::vector<int> unknown;                ///< parallel to nodes; -1: does not move
   std::vector<std::pair<int, int>> pairs;  ///< of unknowns, the larger one first; ascending, each once
   std::vector<std::size_t> pair_of_edge;   ///< parallel to edges; 0 where an end does not move
 
@@ -62,7 +62,12 @@ class BlockCholesky {
   bool Factorise(const std::vector<Block>& diagonal, const std::vector<Block>& off_diagonal);
 
   /// Solves in place; blocks of `b` in the caller's order.
-  void Solve(Eigen::VectorXd& b) const;
+  void Solve(Eigen::VectorXd& b) const { SolveInPlace(Eigen::Map<Columns<1>>(b.data(), b.size(), 1)); }
+  /// The same for N + 2 right-hand sides at once, the rows of `b` one after the other: less than half the
+  /// time of as many.
+  void SolveMany(double* b) const {
+    SolveInPlace(Eigen::Map<Columns<N + 2>>(b, static_cast<Eigen::Index>(N * size()), N + 2));
+  }
 
  private:
   /// One given block of a row, left of the diagonal.
@@ -71,12 +76,16 @@ class BlockCholesky {
     bool transposed;
   };
 
-  static auto Segment(Eigen::VectorXd& v, std::size_t k) {
-    return v.template segment<N>(static_cast<Eigen::Index>(N * k));
+  template <int Sides>
+  using Columns =
+      Eigen::Matrix<double, Eigen::Dynamic, Sides, Sides == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
+
+  template <typename Sides>
+  static auto Segment(Sides& v, std::size_t k) {
+    return v.template middleRows<N>(static_cast<Eigen::Index>(N * k));
   }
-  static auto Segment(const Eigen::VectorXd& v, std::size_t k) {
-    return v.template segment<N>(static_cast<Eigen::Index>(N * k));
-  }
+  template <int Sides>
+  void SolveInPlace(Eigen::Map<Columns<Sides>> b) const;
 
   /// Inverse of the lower triangle; the upper one is not looked at. (Eigen's own goes the way of large
   /// matrices.)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "backend/graph/graph_structure.h"
 #include "backend/solver/block_cholesky.h"
 #include "backend/solver/chordal_descent.h"
+#include "backend/uncertainty/lifted_relaxation.h"
 #include "core/dense_solvers.h"
 #include "core/numbers.h"
 #include "core/stopwatch.h"
@@ -19,8 +21,10 @@
 namespace tutti {
 namespace {
 
+using internal::ChordalTerm;
 using internal::ChordalWeights;
 using internal::GraphStructure;
+using internal::LiftedRelaxation;
 
 /// Two fixed nodes in one part restrict the relative poses: another problem than the certificate's.
 bool HasFreeGauge(const PoseGraph& graph, const GraphStructure& structure) {
@@ -44,18 +48,30 @@ class CertificateMatrix {
   /// `solution`: poses parallel to the nodes.
   CertificateMatrix(const PoseGraph& graph, const std::vector<Similarity>& solution,
                     const GraphStructure& structure)
-      : structure_(structure), diagonal_(graph.nodes().size(), Block::Zero()) {
+      : form_(graph.nodes().size(), Block::Zero()), anchors_(graph.nodes().size(), false) {
+    for (const std::size_t anchor : structure.anchor) anchors_[anchor] = true;
     const std::size_t edges = graph.edges().size();
     const internal::BlockPattern pattern(structure.ends, std::vector<bool>(graph.nodes().size(), false),
                                          std::vector<bool>(edges, true));
     off_diagonal_.assign(pattern.pairs.size(), Block::Zero());
     for (std::size_t e = 0; e < edges; ++e) {
-      AddEdge(structure.ends[e], graph.edges()[e],
-              internal::MakeChordalWeights(graph.edges()[e], graph.kind()), solution,
-              off_diagonal_[pattern.pair_of_edge[e]]);
+      const PoseGraphEdge& edge = graph.edges()[e];
+      const ChordalWeights weights = internal::MakeChordalWeights(edge, graph.kind());
+      terms_.push_back({structure.ends[e].from, structure.ends[e].to,
+                        edge.measurement.rotation.toRotationMatrix().template topLeftCorner<D, D>(),
+                        edge.measurement.translation.template head<D>(), weights.rotation,
+                        weights.translation});
+      AddTerm(terms_.back(), off_diagonal_[pattern.pair_of_edge[e]]);
     }
-    for (const std::size_t anchor : structure.anchor) diagonal_[anchor](0, 0) = 1;
+    for (const std::size_t anchor : structure.anchor) form_[anchor](0, 0) = 1;
     cholesky_.Analyse(pattern.unknowns, pattern.pairs);
+    for (const Similarity& pose : solution) {
+      points_.push_back(Point::Zero());
+      points_.back().template topLeftCorner<D, 1>() = pose.translation.template head<D>();
+      points_.back().template block<D, D>(0, 1) =
+          pose.rotation.toRotationMatrix().template topLeftCorner<D, D>();
+    }
+    SetMultipliers(LiftedRelaxation<D>(terms_, anchors_, points_).Multipliers());
   }
 
   /// Sum of the multipliers' traces: the dual value before the eigenvalue's share.
@@ -74,12 +90,57 @@ class CertificateMatrix {
     return cholesky_.Factorise(shifted, off_diagonal_);
   }
 
+  /// The multipliers of the relaxation take the place of the solution's, which are far from the best where
+  /// the relaxation is not tight. The first call minimises it from the solution, bent out of space along the
+  /// lowest eigenvectors, and needs the factor of IsPositiveDefiniteWith(eta); another one goes on. The
+  /// factor is lost. `tolerance`: share of the cost that the last step may have lowered it by.
+  void Relax(double eta, double tolerance, const internal::StopRequest& stop) {
+    constexpr int kProducts = 1500;
+    if (!relaxed_) relaxed_.emplace(terms_, anchors_, BentSolution(eta));
+    std::vector<Block> shifted = form_;
+    for (Block& block : shifted)
+      block.diagonal().template tail<D>().array() +=
+          relaxed_->cost() / (D * static_cast<double>(form_.size()));
+    if (!cholesky_.Factorise(shifted, off_diagonal_)) return;
+    relaxed_->Minimise(cholesky_, kProducts, tolerance, [&] { internal::ThrowIfStopped(stop); });
+    SetMultipliers(relaxed_->Multipliers());
+  }
+
   /// Lowers the multipliers where the matrix is indefinite; any multipliers give a bound. To lift an
   /// eigenvector v of the eigenvalue -l to zero, a shift of all rotations costs the bound D n l. The blocks
   /// |v_i|^2 v_i v_i^T that lift it cost l sum |v_i|^4 / sum |v_i|^6: as many l as v has nodes. (Blocks v_i
-  /// v_i^T were tried, too: gaps of 0.048 and 0.018 where these leave 0.044 and 0.013.) The eigenvectors come
-  /// from subspace iteration with the factor that IsPositiveDefiniteWith(eta) has left.
+  /// v_i^T were tried, too: gaps of 0.048 and 0.018 where these leave 0.044 and 0.013.) After
+  /// IsPositiveDefiniteWith(eta).
   void LowerMultipliers(double eta) {
+    for (auto& [v, eigenvalue] : LowestVectors(eta)) {
+      if (eigenvalue < 0) Lift(v, -eigenvalue);
+    }
+  }
+
+ private:
+  using Point = typename LiftedRelaxation<D>::Point;
+
+  std::vector<Point> BentSolution(double eta) {
+    constexpr double kMost = 0.3;  // length that a component of an eigenvector adds to a column
+    std::vector<Point> bent = points_;
+    int row = D;
+    for (auto& [v, eigenvalue] : LowestVectors(eta)) {
+      if (eigenvalue >= 0 || row == LiftedRelaxation<D>::kRank) continue;
+      double most = 0;
+      for (std::size_t k = 0; k < bent.size(); ++k)
+        most = std::max(most, RotationOf(v, k).cwiseAbs().maxCoeff());
+      for (std::size_t k = 0; k < bent.size(); ++k) {
+        const auto at = static_cast<Eigen::Index>((D + 1) * k);
+        bent[k].row(row) = kMost / most * v.template segment<D + 1>(at).transpose();
+      }
+      ++row;
+    }
+    return bent;
+  }
+
+  /// The lowest eigenvectors, of length 1, and their eigenvalues by subspace iteration with the factor of Q -
+  /// L + eta I; the lowest one comes first.
+  std::vector<std::pair<Eigen::VectorXd, double>> LowestVectors(double eta) {
     using internal::Index;
     constexpr int kVectors = 6, kSolves = 3;
     while (lowest_.size() < kVectors) lowest_.push_back(RandomVector());
@@ -94,38 +155,42 @@ class CertificateMatrix {
       for (int b = 0; b < kVectors; ++b) inverse(a, b) = basis[Index(a)].dot(lowest_[Index(b)]);
     }
     const internal::Eigenpairs pairs = internal::SymmetricEigen(inverse);
-    for (Eigen::Index c = 0; c < pairs.values.size(); ++c) {
-      const double eigenvalue = 1 / pairs.values(c) - eta;
-      if (!(pairs.values(c) > 0 && eigenvalue < 0)) continue;
+    std::vector<std::pair<Eigen::VectorXd, double>> out;
+    for (Eigen::Index c = pairs.values.size(); c-- > 0;) {
+      if (!(pairs.values(c) > 0)) continue;
       Eigen::VectorXd v = Eigen::VectorXd::Zero(basis[0].size());
-      for (int a = 0; a < kVectors; ++a) v += pairs.vectors(a, c) * basis[Index(a)];
-      Lift(v, -eigenvalue);
+      for (int a = 0; a < kVectors; ++a) v += pairs.vectors(a, c) / pairs.values(c) * lowest_[Index(a)];
+      out.emplace_back(std::move(v), 1 / pairs.values(c) - eta);
+    }
+    return out;
+  }
+
+  void SetMultipliers(const std::vector<Rotation>& multipliers) {
+    diagonal_ = form_;
+    dual_trace_ = 0;
+    for (std::size_t k = 0; k < multipliers.size(); ++k) {
+      diagonal_[k].template bottomRightCorner<D, D>() -= multipliers[k];
+      dual_trace_ += multipliers[k].trace();
     }
   }
 
- private:
   /// ||X c||^2 for the rows of X that belong to a node; `c`: what the edge multiplies them with.
-  void AddEdge(const internal::EdgeEnds& ends, const PoseGraphEdge& edge, const ChordalWeights& weights,
-               const std::vector<Similarity>& solution, Block& off_diagonal) {
-    const double kappa = weights.rotation, tau = weights.translation;
-    const Rotation R = edge.measurement.rotation.toRotationMatrix().template topLeftCorner<D, D>();
-    const Column t = edge.measurement.translation.template head<D>();
+  void AddTerm(const ChordalTerm<D>& term, Block& off_diagonal) {
     Eigen::Matrix<double, D + 1, 1> c_i, c_j;
-    c_i << (IsAnchor(ends.from) ? 0 : -1), -t;
-    c_j << (IsAnchor(ends.to) ? 0 : 1), Column::Zero();
-    Block at_i = tau * c_i * c_i.transpose(), at_j = tau * c_j * c_j.transpose();
-    at_i.template bottomRightCorner<D, D>() += kappa * Rotation::Identity();
-    at_j.template bottomRightCorner<D, D>() += kappa * Rotation::Identity();
-    Block between = tau * c_i * c_j.transpose();
-    between.template bottomRightCorner<D, D>() -= kappa * R;
-    diagonal_[ends.from] += at_i;
-    diagonal_[ends.to] += at_j;
-    if (ends.from > ends.to) {
+    c_i << (anchors_[term.i] ? 0 : -1), -term.t;
+    c_j << (anchors_[term.j] ? 0 : 1), Column::Zero();
+    Block at_i = term.tau * c_i * c_i.transpose(), at_j = term.tau * c_j * c_j.transpose();
+    at_i.template bottomRightCorner<D, D>() += term.kappa * Rotation::Identity();
+    at_j.template bottomRightCorner<D, D>() += term.kappa * Rotation::Identity();
+    Block between = term.tau * c_i * c_j.transpose();
+    between.template bottomRightCorner<D, D>() -= term.kappa * term.R;
+    form_[term.i] += at_i;
+    form_[term.j] += at_j;
+    if (term.i > term.j) {
       off_diagonal += between;
     } else {
       off_diagonal += between.transpose();
     }
-    SubtractMultipliers(ends, R, t, weights, solution[ends.from], solution[ends.to]);
   }
 
   auto RotationOf(Eigen::VectorXd& v, std::size_t node) const {
@@ -164,26 +229,11 @@ class CertificateMatrix {
     dual_trace_ -= weight * fourth;
   }
 
-  bool IsAnchor(std::size_t node) const { return structure_.anchor[structure_.component_of[node]] == node; }
-
-  /// L_i = sym(R_i^T (X M)_i): what the constraint R_i^T R_i = I pulls with at a stationary point.
-  void SubtractMultipliers(const internal::EdgeEnds& ends, const Rotation& R, const Column& t,
-                           const ChordalWeights& weights, const Similarity& pose_i,
-                           const Similarity& pose_j) {
-    const Rotation Ri = pose_i.rotation.toRotationMatrix().template topLeftCorner<D, D>();
-    const Rotation Rj = pose_j.rotation.toRotationMatrix().template topLeftCorner<D, D>();
-    const Column step = (pose_j.translation - pose_i.translation).template head<D>();
-    const Rotation rotation = weights.rotation * (Rj - Ri * R);
-    const Column translation = weights.translation * (step - Ri * t);
-    const Rotation at_i = -Ri.transpose() * (rotation * R.transpose() + translation * t.transpose());
-    const Rotation at_j = Rj.transpose() * rotation;
-    diagonal_[ends.from].template bottomRightCorner<D, D>() -= 0.5 * (at_i + at_i.transpose());
-    diagonal_[ends.to].template bottomRightCorner<D, D>() -= 0.5 * (at_j + at_j.transpose());
-    dual_trace_ += at_i.trace() + at_j.trace();
-  }
-
-  const GraphStructure& structure_;
-  std::vector<Block> diagonal_, off_diagonal_;
+  std::vector<ChordalTerm<D>> terms_;
+  std::vector<Block> form_, diagonal_, off_diagonal_;  // form_: the diagonal of Q
+  std::vector<bool> anchors_;
+  std::vector<Point> points_;  // the solution
+  std::optional<LiftedRelaxation<D>> relaxed_;
   double dual_trace_ = 0;
   std::vector<Eigen::VectorXd> lowest_;  // the subspace near the lowest eigenvalues
   std::mt19937 random_{1};
@@ -211,31 +261,39 @@ double SmallestShift(CertificateMatrix<D>& matrix, double certifying, double lar
   return certifying * std::pow(10, holds);
 }
 
-/// The bound by lower multipliers, where a shift of all rotations costs too much. Returns the shift that is
-/// left.
+/// The bound by better multipliers, where a shift of all rotations costs too much. `eta`: the shift that
+/// SmallestShift found. Returns the one that is left.
 template <int D>
-double TightenBound(CertificateMatrix<D>& matrix, double eta, double traces,
-                    const internal::StopRequest& stop, Certificate& out) {
+double TightenBound(CertificateMatrix<D>& matrix, double eta, double traces, double certifying,
+                    double largest, const internal::StopRequest& stop, Certificate& out) {
   constexpr int kRounds = 20;       // each takes two or three factorisations
   constexpr double kEnough = 1e-3;  // share of the cost that the shift may take
+  constexpr double kGood = 0.02;    // gap that is not worth more time
   const auto shrink = [&](double factor) {
+    internal::ThrowIfStopped(stop);
     const bool holds = matrix.IsPositiveDefiniteWith(factor * eta);
     if (holds) eta *= factor;
     return holds;
   };
-  if (eta * traces <= kEnough * out.chordal) return eta;
-  // Near the lowest eigenvalue its vectors come fast. It is known within a factor of ten, which is 0.7^7.
-  for (int k = 0; k < 7 && shrink(0.7); ++k) internal::ThrowIfStopped(stop);
-  out.lower_bound = matrix.DualTrace() - eta * traces;
-  // The trace, which bounds what can be had, only falls.
-  for (int round = 0; round < kRounds && eta * traces > kEnough * out.chordal &&
-                      matrix.DualTrace() > std::max(0.0, out.lower_bound);
-       ++round) {
-    internal::ThrowIfStopped(stop);
-    if (!matrix.IsPositiveDefiniteWith(eta)) break;
-    matrix.LowerMultipliers(eta);
-    if (!shrink(0.25)) shrink(0.5);
+  // Whether the bound is worth more time; if so, the factor is that of `eta`, which is near the lowest
+  // eigenvalue, where its vectors come fast.
+  const auto not_enough = [&] {
+    const auto much = [&] { return eta * traces > kEnough * out.chordal; };
+    while (much() && shrink(0.5)) continue;
+    if (much()) shrink(0.7);
     out.lower_bound = std::max(out.lower_bound, matrix.DualTrace() - eta * traces);
+    return much() && matrix.IsPositiveDefiniteWith(eta);
+  };
+  if (!not_enough()) return eta;
+  for (const double tolerance : {1e-4, 1e-5, 1e-6}) {
+    matrix.Relax(eta, tolerance, stop);
+    const double relaxed = SmallestShift(matrix, certifying, largest, stop);
+    if (relaxed < 0) return eta;
+    eta = relaxed;
+    // The trace, which bounds what can be had, only falls.
+    for (int round = 0; not_enough() && round < kRounds && matrix.DualTrace() > out.lower_bound; ++round)
+      matrix.LowerMultipliers(eta);
+    if (out.chordal - out.lower_bound <= kGood * out.chordal) return eta;
   }
   return eta;
 }
@@ -247,8 +305,8 @@ void Bound(const PoseGraph& graph, const std::vector<Similarity>& solution, cons
   const double traces = D * static_cast<double>(graph.nodes().size());  // trace(R R^T) of any rotations
   const double largest = matrix.LargestRotationEntry();
   const double rounding = 1e-14 * largest;
-  double eta = SmallestShift(matrix, std::max(rounding, options.certified_gap * out.chordal / traces),
-                             options.max_shift * largest, stop);
+  const double certifying = std::max(rounding, options.certified_gap * out.chordal / traces);
+  double eta = SmallestShift(matrix, certifying, options.max_shift * largest, stop);
   if (eta < 0) {
     out.reason = "the certificate matrix has a large negative eigenvalue";
     out.min_eigenvalue_bound = -std::numeric_limits<double>::infinity();
@@ -256,7 +314,7 @@ void Bound(const PoseGraph& graph, const std::vector<Similarity>& solution, cons
     return;
   }
   out.lower_bound = matrix.DualTrace() - eta * traces;
-  eta = TightenBound(matrix, eta, traces, stop, out);
+  eta = TightenBound(matrix, eta, traces, certifying, options.max_shift * largest, stop, out);
   out.min_eigenvalue_bound = -eta;
   out.lower_bound = std::max(0.0, out.lower_bound);
   const double gap = std::max(0.0, out.chordal - out.lower_bound);

@@ -2,8 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <nlohmann/json.hpp>
 
+#include "apps/run/camera_clocks.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
 #include "tests/support/test_data.h"
@@ -61,6 +63,45 @@ TEST(MeasuredClocks, ARunBeginsAnewWithReadoutAndDelayOnceTheyAreSure) {
   EXPECT_EQ(ran.summary["frames"]["total"], 180) << "those of the last beginning alone";
   EXPECT_LT(ran.summary["evaluation"]["slam"]["ate_rmse_m"].get<double>(), 0.015) << "0.1 without";
   EXPECT_EQ(RunUntold(room, 1).trajectory, ran.trajectory);
+}
+
+TEST(MeasuredClocks, AResumedRunStillSaysWhatWasMeasured) {
+  const fs::path room = testing::GeneratedDataset(RoomInAHand(true));
+  const std::string out = (testing::FreshFolder() / "out").string();
+  // Interrupted in its second beginning.
+  const auto broken =
+      testing::RunTuttiAndSignal({"run", "--config", (room / "config.yaml").string(), "--dataset",
+                                  room.string(), "--out", out, "--no-loops", "--checkpoint", "3600", "--set",
+                                  "camera.readout_s=0", "--set", "camera.depth_delay_s=0"},
+                                 "begins anew with that", SIGINT);
+  EXPECT_EQ(broken.status, 130) << broken.output;
+  const auto run = RunTutti({"run", "--resume", out});
+  ASSERT_EQ(run.status, 0) << run.output;
+  const auto summary = nlohmann::json::parse(ReadAll(fs::path(out) / "summary.json"));
+  EXPECT_TRUE(summary["clocks"]["readout_s"]["used"].get<bool>());
+  EXPECT_EQ(summary["config"]["camera"]["readout_s"], summary["clocks"]["readout_s"]["value"]);
+}
+
+TEST(MeasuredClocks, TheTimeOfAllBeginningsCounts) {
+  RunRequest request;
+  request.dataset = testing::GeneratedDataset(RoomInAHand(true));
+  request.quiet = true;
+  RunResult blank, result;
+  blank.config = LoadConfig(request.dataset / "config.yaml");
+  result = blank;
+  result.wall_s = 3;
+  result.cpu_s = 4;
+  result.frames_lost = 5;
+  ClocksFound found;
+  found.readout_s = 0.02;
+  found.readout_sigma_s = 5e-4;
+  const auto dataset = BeginAnew(request, found, blank, result);
+  EXPECT_EQ(result.wall_s, 3);
+  EXPECT_EQ(result.cpu_s, 4);
+  EXPECT_EQ(result.frames_lost, 0u);
+  EXPECT_EQ(result.begun_anew, 1);
+  EXPECT_NEAR(dataset->Rig().readout_s, 0.02, 1e-12);
+  EXPECT_EQ(result.clocks_used->readout_s, 0.02);
 }
 
 TEST(MeasuredClocks, OfPerfectClocksNothingIsTaken) {

@@ -8,8 +8,9 @@
 // a certificate matrix Q - L without a negative eigenvalue proves that nothing better exists. lambda_min >=
 // -eta is shown by a Cholesky factorisation of Q - L + eta I that succeeds (as in Rosen, "Accelerating
 // certifiable estimation with preconditioned eigensolvers", RA-L 2022); Lanczos would bound lambda_min from
-// the wrong side. Where it is negative, L is lowered along the lowest eigenvectors until little of eta is
-// left. The bound holds for all rotations and translations, of whatever rank, and wherever L comes from; it
+// the wrong side. Where it is negative, L comes from the relaxation, in which rotations may leave space
+// (Riemannian staircase, ibid. section 4.2), and is lowered along the lowest eigenvectors until little of eta
+// is left. The bound holds for all rotations and translations, of whatever rank, and wherever L comes from; it
 // is one of the chordal objective (pose_graph_optimizer.h) with all weights 1, not of chi2.
 #pragma once
 

@@ -14,7 +14,7 @@ namespace tutti::cli {
 /// Adds the options of a command, and a callback that does the work, sets the exit status, and may throw
 /// InputError, which RunProgram prints as one line. Names and sentences: program.cc.
 using SetUp = void(CLI::App& command, int& exit_code);
-SetUp SetUpRun, SetUpLocalize, SetUpMerge, SetUpExport, SetUpMap, SetUpCalibrateCheck, SetUpEvaluate,
+SetUp SetUpRun, SetUpLocalize, SetUpMerge, SetUpExport, SetUpDense, SetUpMap, SetUpCalibrateCheck, SetUpEvaluate,
     SetUpConvert, SetUpPlot, SetUpClose, SetUpCompare, SetUpCollect, SetUpLoops, SetUpCompareLoops,
     SetUpOptimize, SetUpGenerate, SetUpDemo;
 

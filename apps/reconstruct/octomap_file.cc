@@ -16,16 +16,20 @@ void WriteOctomap(const std::filesystem::path& file, const OccupiedSpace& space)
   const auto set = [&](const std::vector<Eigen::Vector3i>& cells, bool occupied) {
     for (const Eigen::Vector3i& cell : cells) {
       const Eigen::Vector3d centre = space.cell_m * (cell.cast<double>() + Eigen::Vector3d::Constant(0.5));
-      tree.updateNode(octomap::point3d(Eigen::Vector3f(centre.cast<float>()).x(), static_cast<float>(centre.y()),
-                                       static_cast<float>(centre.z())),
-                      occupied, true);
+      const Eigen::Vector3f at = centre.cast<float>();
+      tree.updateNode(octomap::point3d(at.x(), at.y(), at.z()), occupied, true);
     }
   };
   set(space.free, false);
   set(space.occupied, true);
   tree.updateInnerOccupancy();
+  tree.toMaxLikelihood();
+  tree.prune();
+  // As AbstractOccupancyOcTree::writeBinaryConst, which prints on the terminal.
   std::ostringstream bytes;
-  if (!tree.writeBinary(bytes)) throw InputError(file.string() + ": OctoMap could not write it");
+  bytes << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
+        << "id " << tree.getTreeType() << "\nsize " << tree.size() << "\nres " << tree.getResolution() << "\ndata\n";
+  tree.writeBinaryData(bytes);
   internal::WriteFile(file, bytes.str());
 }
 

@@ -12,16 +12,19 @@ namespace {
 
 using internal::AppendLittleEndian;
 
-std::string PlyOf(const PointCloud& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles, bool mesh) {
+std::string PlyOf(const PointCloud& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                  bool mesh) {
   std::string bytes =
-      "ply\nformat binary_little_endian 1.0\ncomment written by tutti; metres, in the world of the trajectory\n"
+      "ply\nformat binary_little_endian 1.0\ncomment written by tutti; metres, in the world of the "
+      "trajectory\n"
       "element vertex " +
       std::to_string(vertices.points.size()) +
       "\nproperty float x\nproperty float y\nproperty float z\n"
       "property float nx\nproperty float ny\nproperty float nz\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (mesh)
-    bytes += "element face " + std::to_string(triangles.size()) + "\nproperty list uchar int vertex_indices\n";
+    bytes +=
+        "element face " + std::to_string(triangles.size()) + "\nproperty list uchar int vertex_indices\n";
   bytes += "end_header\n";
   bytes.reserve(bytes.size() + 27 * vertices.points.size() + 13 * triangles.size());
   for (std::size_t i = 0; i < vertices.points.size(); ++i) {
@@ -46,13 +49,14 @@ std::string YamlOf(const OccupancyGrid& grid) {
   const auto& R = grid.T_map_world.rotation;
   const auto& t = grid.T_map_world.translation;
   char text[800];
-  std::snprintf(text, sizeof text,
-                "# written by tutti: z up from the ground, the origin below the first camera, x to where it looked\n"
-                "# from the trajectory's world to this map, tx ty tz [m] qx qy qz qw: "
-                "%.6f %.6f %.6f %.8f %.8f %.8f %.8f\n"
-                "image: map.pgm\nmode: trinary\nresolution: %.6g\norigin: [%.6f, %.6f, 0.0]\nnegate: 0\n"
-                "occupied_thresh: 0.65\nfree_thresh: 0.196\n",
-                t.x(), t.y(), t.z(), R.x(), R.y(), R.z(), R.w(), grid.cell_m, grid.origin.x(), grid.origin.y());
+  std::snprintf(
+      text, sizeof text,
+      "# written by tutti: z up from the ground, the origin below the first camera, x to where it looked\n"
+      "# from the trajectory's world to this map, tx ty tz [m] qx qy qz qw: "
+      "%.6f %.6f %.6f %.8f %.8f %.8f %.8f\n"
+      "image: map.pgm\nmode: trinary\nresolution: %.6g\norigin: [%.6f, %.6f, 0.0]\nnegate: 0\n"
+      "occupied_thresh: 0.65\nfree_thresh: 0.196\n",
+      t.x(), t.y(), t.z(), R.x(), R.y(), R.z(), R.w(), grid.cell_m, grid.origin.x(), grid.origin.y());
   return text;
 }
 

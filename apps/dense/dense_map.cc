@@ -15,12 +15,15 @@
 namespace tutti {
 namespace {
 
-constexpr std::size_t kSpeck = 32;   // a piece of fewer triangles is noise
+constexpr std::size_t kSpeck = 32;    // a piece of fewer triangles is noise
 constexpr double kReachVoxels = 1e4;  // farther depth is none, or in another unit
 
-std::string SizeOf(const cv::Mat& image) { return std::to_string(image.cols) + "x" + std::to_string(image.rows); }
+std::string SizeOf(const cv::Mat& image) {
+  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
+}
 
-// Inverse depth; 0 where nothing is measured, or what is farther than `most_m`. Returns how many were farther.
+// Inverse depth; 0 where nothing is measured, or what is farther than `most_m`. Returns how many were
+// farther.
 long SetDepth(const cv::Mat& depth_m, double most_m, DepthView* view) {
   view->inverse_depth.create(depth_m.size(), CV_32FC1);
   const auto most = static_cast<float>(most_m);
@@ -75,7 +78,8 @@ std::string DenseMap::Impl::Problem(const cv::Mat& depth_m, const cv::Mat& image
   if (depth_m.size() != size)
     return "the depth image is " + SizeOf(depth_m) + ", the camera " + std::to_string(camera.width) + "x" +
            std::to_string(camera.height);
-  if (!image.empty() && image.size() != size) return "the image is " + SizeOf(image) + ", the depth image " + SizeOf(depth_m);
+  if (!image.empty() && image.size() != size)
+    return "the image is " + SizeOf(image) + ", the depth image " + SizeOf(depth_m);
   if (!image.empty() && image.type() != CV_8UC3 && image.type() != CV_8UC1)
     return "the image must have 8 bits, and one channel or three";
   if (!T_world_camera.IsFinite()) return "its pose is not finite";
@@ -110,7 +114,8 @@ std::string DenseMap::Impl::Integrate(const DepthView& view) {
 }
 
 DenseMap::DenseMap(const DenseOptions& options) {
-  if (const std::string problem = options.Validate(); !problem.empty()) throw InputError("dense map: " + problem);
+  if (const std::string problem = options.Validate(); !problem.empty())
+    throw InputError("dense map: " + problem);
   impl_ = std::make_unique<Impl>(options);
 }
 DenseMap::~DenseMap() = default;
@@ -119,13 +124,15 @@ DenseMap::DenseMap(DenseMap&&) noexcept = default;
 std::string DenseMap::Integrate(const cv::Mat& depth_m, const cv::Mat& image, const Pose& T_world_camera,
                                 const PinholeCamera& camera) {
   std::string problem = camera.Validate();
-  if (problem.empty() && camera.distortion != Distortion::kNone) problem = "the camera must have no distortion";
+  if (problem.empty() && camera.distortion != Distortion::kNone)
+    problem = "the camera must have no distortion";
   if (problem.empty()) problem = impl_->Problem(depth_m, image, T_world_camera, camera);
   DepthView view{camera, T_world_camera, {}, image, 0};
   if (problem.empty()) {
     const DenseOptions& options = impl_->options;
     const double most = kReachVoxels * options.voxel_m;
-    const long farther = SetDepth(depth_m, options.max_depth_m > 0 ? std::min(options.max_depth_m, most) : most, &view);
+    const long farther =
+        SetDepth(depth_m, options.max_depth_m > 0 ? std::min(options.max_depth_m, most) : most, &view);
     if (!(view.farthest_m > 0))
       problem = farther == 0 ? "its depth image is empty"
                              : "all its depth is beyond " + std::to_string(std::lround(most)) +
@@ -151,11 +158,13 @@ PointCloud DenseMap::Cloud() const {
     for (; i < surface.voxels.size() && surface.voxels[i] == surface.voxels[first]; ++i) {
       point += vertices.points[i];
       normal += vertices.normals[i];
-      for (int c = 0; c < 3; ++c) colour[c] += static_cast<float>(vertices.colours[i][static_cast<std::size_t>(c)]);
+      for (int c = 0; c < 3; ++c)
+        colour[c] += static_cast<float>(vertices.colours[i][static_cast<std::size_t>(c)]);
     }
     const auto count = static_cast<float>(i - first);
     cloud.points.emplace_back(point / count);
-    cloud.normals.emplace_back(normal.norm() > 0 ? Eigen::Vector3f(normal.normalized()) : vertices.normals[first]);
+    cloud.normals.emplace_back(normal.norm() > 0 ? Eigen::Vector3f(normal.normalized())
+                                                 : vertices.normals[first]);
     cloud.colours.emplace_back();
     for (int c = 0; c < 3; ++c)
       cloud.colours.back()[static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(colour[c] / count + 0.5F);

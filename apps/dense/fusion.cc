@@ -11,8 +11,8 @@ namespace tutti {
 namespace {
 
 constexpr float kNear = 0.01F;  // [m]
-// Depth is interpolated between pixels whose inverse depths differ by less than this share, times 1/f: where the
-// surface is seen at less than about 84 degrees from its normal. Else there is an edge between them.
+// Depth is interpolated between pixels whose inverse depths differ by less than this share, times 1/f: where
+// the surface is seen at less than about 84 degrees from its normal. Else there is an edge between them.
 constexpr float kSteepest = 15;
 
 // Keys of the blocks along the rays of some rows.
@@ -96,7 +96,8 @@ class BlockFusion {
     const Eigen::Vector3d at = T_camera_world_ * (first_voxel + Eigen::Vector3d::Constant(0.5 * size));
     if (at.z() < -radius || at.z() > view_.farthest_m + static_cast<double>(band_) + radius) return false;
     const PinholeCamera& c = view_.camera;
-    const auto outside = [&](double f, double x, double from) {  // f x + from z < 0: beyond a side of the image
+    const auto outside = [&](double f, double x,
+                             double from) {  // f x + from z < 0: beyond a side of the image
       return f * x + from * at.z() < -radius * std::hypot(f, from);
     };
     return !outside(c.fx, at.x(), c.cx) && !outside(-c.fx, at.x(), c.width - 1 - c.cx) &&
@@ -108,8 +109,10 @@ class BlockFusion {
     Voxel* voxel = block->data();
     for (int z = 0; z < kBlockSide; ++z) {
       for (int y = 0; y < kBlockSide; ++y) {
-        const Eigen::Vector3f row = first + static_cast<float>(z) * step_.col(2) + static_cast<float>(y) * step_.col(1);
-        for (int x = 0; x < kBlockSide; ++x, ++voxel) UpdateVoxel(row + static_cast<float>(x) * step_.col(0), voxel);
+        const Eigen::Vector3f row =
+            first + static_cast<float>(z) * step_.col(2) + static_cast<float>(y) * step_.col(1);
+        for (int x = 0; x < kBlockSide; ++x, ++voxel)
+          UpdateVoxel(row + static_cast<float>(x) * step_.col(0), voxel);
       }
     }
   }
@@ -142,7 +145,8 @@ class BlockFusion {
     voxel->distance += (std::min(ahead, band_) - voxel->distance) * (weight / sum);
     voxel->weight = sum;
     if (voxel->frames < std::numeric_limits<std::uint16_t>::max()) ++voxel->frames;
-    if (!view_.bgr.empty() && ahead < band_) Colour(view_.bgr.ptr<std::uint8_t>(near_v) + 3 * near_u, weight / sum, voxel);
+    if (!view_.bgr.empty() && ahead < band_)
+      Colour(view_.bgr.ptr<std::uint8_t>(near_v) + 3 * near_u, weight / sum, voxel);
   }
 
   // Inverse depth is linear over the image of a plane.
@@ -155,7 +159,8 @@ class BlockFusion {
     const float most = std::max(std::max(upper[0], upper[1]), std::max(lower[0], lower[1]));
     if (!(least > 0) || most - least > edge_ * most) return nearest;
     const float right = u - static_cast<float>(left), down = v - static_cast<float>(top);
-    return (1 - down) * (upper[0] + right * (upper[1] - upper[0])) + down * (lower[0] + right * (lower[1] - lower[0]));
+    return (1 - down) * (upper[0] + right * (upper[1] - upper[0])) +
+           down * (lower[0] + right * (lower[1] - lower[0]));
   }
 
   static void Colour(const std::uint8_t* bgr, float share, Voxel* voxel) {
@@ -175,7 +180,8 @@ class BlockFusion {
 // Calls work(first, last) for parts of 0 .. count.
 template <class Work>
 void InParts(int count, int parts, int threads, const Work& work) {
-  RunParallel(parts, threads, [&](int part) { work(part, part * count / parts, (part + 1) * count / parts); });
+  RunParallel(parts, threads,
+              [&](int part) { work(part, part * count / parts, (part + 1) * count / parts); });
 }
 
 }  // namespace
@@ -185,7 +191,8 @@ std::vector<std::uint64_t> MissingBlocks(const DepthView& view, bool free_space,
   constexpr int kParts = 8;
   std::array<std::vector<std::uint64_t>, kParts> touched;
   InParts(view.inverse_depth.rows, kParts, threads, [&](int part, int first, int last) {
-    touched[static_cast<std::size_t>(part)] = TouchedBlocks(view, free_space, blocks.voxel_m()).OfRows(first, last);
+    touched[static_cast<std::size_t>(part)] =
+        TouchedBlocks(view, free_space, blocks.voxel_m()).OfRows(first, last);
   });
   std::vector<std::uint64_t> missing;
   for (const std::vector<std::uint64_t>& keys : touched) {

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double kBin = 0.05;  // of heights [m]
 
-// Turned around from `start`, the mean of the normals within an angle that shrinks: the direction that most of them
-// have.
+// Turned around from `start`, the mean of the normals within an angle that shrinks: the direction that most
+// of them have.
 Eigen::Vector3d LevelNormal(const PointCloud& surface, Eigen::Vector3d up) {
   for (const double degrees : {45.0, 30.0, 20.0, 10.0, 10.0}) {
     const double least = std::cos(degrees * internal::kRadians);
@@ -38,7 +38,8 @@ std::vector<Eigen::Vector3d> LevelPoints(const PointCloud& surface, const Eigen:
 }
 
 // The height of the lowest plane below `below` that has at least a quarter as many points as the largest one.
-double LowestLevel(const std::vector<Eigen::Vector3d>& level, const Eigen::Vector3d& up, double below, bool* found) {
+double LowestLevel(const std::vector<Eigen::Vector3d>& level, const Eigen::Vector3d& up, double below,
+                   bool* found) {
   std::map<long, std::size_t> bins;
   for (const Eigen::Vector3d& point : level) {
     const double height = up.dot(point);
@@ -64,8 +65,8 @@ Eigen::Matrix3d Upright(const Eigen::Vector3d& up, const Eigen::Vector3d& forwar
   return rows;
 }
 
-// Least squares: the plane z = a x + b y + c through the points within a bin of height 0, in the frame of T. Turns and
-// shifts the frame so that it is z = 0.
+// Least squares: the plane z = a x + b y + c through the points within a bin of height 0, in the frame of T.
+// Turns and shifts the frame so that it is z = 0.
 Pose Levelled(const Pose& T_map_world, const std::vector<Eigen::Vector3d>& points) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();

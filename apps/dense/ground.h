@@ -16,7 +16,8 @@ struct MapFrame2d {
 };
 
 /// The ground is the lowest large plane below the cameras that lies level; level is what most surfaces are
-/// whose normals point against the cameras' y axes, within 45 degrees. `cameras`: T_world_camera, at least one.
+/// whose normals point against the cameras' y axes, within 45 degrees. `cameras`: T_world_camera, at least
+/// one.
 MapFrame2d FindMapFrame(const PointCloud& surface, const std::vector<Pose>& cameras);
 
 }  // namespace tutti

@@ -23,10 +23,11 @@ int EdgeBetween(int a, int b) {
 constexpr std::array<std::array<int, 4>, 6> kFaces = {
     {{{0, 4, 6, 2}}, {{1, 3, 7, 5}}, {{0, 1, 5, 4}}, {{2, 6, 7, 3}}, {{0, 2, 3, 1}}, {{4, 5, 7, 6}}}};
 
-// The polygons that part the corners behind the surface (the bits of `behind`) from the others. On each face a
-// line cuts off each run of corners that are behind. It goes from the edge where the run begins, as one walks round the
-// face, to that where it ends; there the next face's line begins. So the lines form closed polygons, anticlockwise as
-// seen from before the surface, and cubes that share a face agree about it, also where two opposite corners are behind.
+// The polygons that part the corners behind the surface (the bits of `behind`) from the others. On each face
+// a line cuts off each run of corners that are behind. It goes from the edge where the run begins, as one
+// walks round the face, to that where it ends; there the next face's line begins. So the lines form closed
+// polygons, anticlockwise as seen from before the surface, and cubes that share a face agree about it, also
+// where two opposite corners are behind.
 std::vector<Polygon> PolygonsOf(int behind) {
   std::array<int, kEdges> next;
   next.fill(-1);
@@ -68,7 +69,8 @@ using EdgeTriangle = std::array<EdgeNumber, 3>;
 // The voxels of a block and of the next ones: what its 8 x 8 x 8 cubes need.
 class BlockSurroundings {
  public:
-  BlockSurroundings(const VoxelBlocks& blocks, int block, int min_frames) : blocks_(blocks), min_frames_(min_frames) {
+  BlockSurroundings(const VoxelBlocks& blocks, int block, int min_frames)
+      : blocks_(blocks), min_frames_(min_frames) {
     for (int n = 0; n < kCorners; ++n) {
       const Eigen::Vector3i step(n & 1, n >> 1 & 1, n >> 2);
       numbers_[static_cast<std::size_t>(n)] = n == 0 ? block : blocks.Find(blocks.corner(block) + step);
@@ -96,8 +98,9 @@ class BlockSurroundings {
   std::array<int, kCorners> numbers_;
 };
 
-// Along an edge of a cube on a surface the distance changes by a voxel, seen at a slant by up to this many. More is
-// the border of what hides something, where the band's end meets free space: no surface was seen there.
+// Along an edge of a cube on a surface the distance changes by a voxel, seen at a slant by up to this many.
+// More is the border of what hides something, where the band's end meets free space: no surface was seen
+// there.
 constexpr float kSteepestVoxels = 3;
 
 // Appends the triangles of a cube.
@@ -117,7 +120,8 @@ void Triangulate(const BlockSurroundings& around, int x, int y, int z, float ste
   };
   const auto is_steep = [&](int edge) {
     const int from = edge / 3, to = from | 1 << edge % 3;
-    return std::abs(distances[static_cast<std::size_t>(from)] - distances[static_cast<std::size_t>(to)]) > steepest;
+    return std::abs(distances[static_cast<std::size_t>(from)] - distances[static_cast<std::size_t>(to)]) >
+           steepest;
   };
   for (const Polygon& polygon : AllPolygons()[static_cast<std::size_t>(behind)]) {
     if (std::any_of(polygon.begin(), polygon.end(), is_steep)) continue;
@@ -142,7 +146,8 @@ std::vector<EdgeTriangle> TrianglesOf(const VoxelBlocks& blocks, int block, int 
 void SetVertex(const VoxelBlocks& blocks, EdgeNumber edge, std::size_t i, PointCloud* vertices) {
   const int axis = static_cast<int>(edge % 3), in_block = static_cast<int>(edge / 3 % kBlockVoxels);
   const int block = static_cast<int>(edge / 3 / kBlockVoxels);
-  const Eigen::Vector3i from = kBlockSide * blocks.corner(block) + Eigen::Vector3i(in_block & 7, in_block >> 3 & 7, in_block >> 6);
+  const Eigen::Vector3i from =
+      kBlockSide * blocks.corner(block) + Eigen::Vector3i(in_block & 7, in_block >> 3 & 7, in_block >> 6);
   const Voxel& a = blocks.block(block)[static_cast<std::size_t>(in_block)];
   const Voxel& b = *blocks.At(from + Eigen::Vector3i::Unit(axis));
   const float share = a.distance / (a.distance - b.distance);
@@ -184,7 +189,8 @@ VoxelMesh MarchingCubes(const VoxelBlocks& blocks, int min_frames, int threads) 
   });
   std::vector<EdgeNumber> edges;
   for (const std::vector<EdgeTriangle>& triangles : of_blocks) {
-    for (const EdgeTriangle& triangle : triangles) edges.insert(edges.end(), triangle.begin(), triangle.end());
+    for (const EdgeTriangle& triangle : triangles)
+      edges.insert(edges.end(), triangle.begin(), triangle.end());
   }
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());

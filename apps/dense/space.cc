@@ -43,7 +43,8 @@ Cells ReachedBlocks(const VoxelBlocks& seen, const Pose& T_map_world) {
   return reached;
 }
 
-Cells FreeCells(const VoxelBlocks& seen, const Pose& T_map_world, const Eigen::Vector3i& block, int min_frames) {
+Cells FreeCells(const VoxelBlocks& seen, const Pose& T_map_world, const Eigen::Vector3i& block,
+                int min_frames) {
   const Pose T_world_map = T_map_world.Inverse();
   Cells cells;
   for (int i = 0; i < kBlockVoxels; ++i) {
@@ -58,8 +59,8 @@ Cells FreeCells(const VoxelBlocks& seen, const Pose& T_map_world, const Eigen::V
 
 }  // namespace
 
-OccupiedSpace SpaceIn(const MapFrame2d& frame, const PointCloud& surface, const VoxelBlocks& seen, int min_frames,
-                      int threads) {
+OccupiedSpace SpaceIn(const MapFrame2d& frame, const PointCloud& surface, const VoxelBlocks& seen,
+                      int min_frames, int threads) {
   OccupiedSpace space;
   space.cell_m = seen.voxel_m();
   space.T_map_world = frame.T_map_world;
@@ -75,7 +76,8 @@ OccupiedSpace SpaceIn(const MapFrame2d& frame, const PointCloud& surface, const 
   });
   for (const Cells& cells : of_blocks) {
     for (const Eigen::Vector3i& cell : cells) {
-      if (!std::binary_search(space.occupied.begin(), space.occupied.end(), cell, Before)) space.free.push_back(cell);
+      if (!std::binary_search(space.occupied.begin(), space.occupied.end(), cell, Before))
+        space.free.push_back(cell);
     }
   }
   std::sort(space.free.begin(), space.free.end(), Before);
@@ -105,7 +107,9 @@ OccupancyGrid GridOf(const OccupiedSpace& space, double low_m, double high_m) {
   grid.cells = cv::Mat(most.y() - least.y() + 1, most.x() - least.x() + 1, CV_8SC1, cv::Scalar(-1));
   for (const auto& [cells, value] : {std::make_pair(&space.free, 0), std::make_pair(&space.occupied, 100)}) {
     for (const Eigen::Vector3i& cell : *cells) {
-      if (within(cell)) grid.cells.at<std::int8_t>(cell.y() - least.y(), cell.x() - least.x()) = static_cast<std::int8_t>(value);
+      if (within(cell))
+        grid.cells.at<std::int8_t>(cell.y() - least.y(), cell.x() - least.x()) =
+            static_cast<std::int8_t>(value);
     }
   }
   return grid;

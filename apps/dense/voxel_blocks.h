@@ -40,8 +40,8 @@ inline Eigen::Vector3i BlockCorner(std::uint64_t key) {
   return corner;
 }
 
-/// Voxel (i, j, k) is at (i, j, k) * voxel_m in the world. Blocks are numbered in the order in which they were
-/// made, which nothing but the sequence of calls decides.
+/// Voxel (i, j, k) is at (i, j, k) * voxel_m in the world. Blocks are numbered in the order in which they
+/// were made, which nothing but the sequence of calls decides.
 class VoxelBlocks {
  public:
   /// Blocks lie within so many of the origin along each axis.

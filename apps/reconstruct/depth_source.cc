@@ -23,7 +23,8 @@ class SensorDepth : public DepthSource {
   DepthImageRead Read(const PosedFrame& frame) const override {
     const ReadResult read = dataset_.Read(frame.place);
     if (!read.frame) return {{}, read.error};
-    if (read.frame->depth_m.empty()) return {{}, read.depth_error.empty() ? "it has no depth image" : read.depth_error};
+    if (read.frame->depth_m.empty())
+      return {{}, read.depth_error.empty() ? "it has no depth image" : read.depth_error};
     return {read.frame->depth_m, {}};
   }
 
@@ -42,11 +43,12 @@ class StereoDepth : public DepthSource {
   DepthImageRead Read(const PosedFrame& frame) const override {
     const ReadResult read = dataset_.Read(frame.place);
     if (!read.frame) return {{}, read.error};
-    if (read.frame->right.empty()) return {{}, read.depth_error.empty() ? "it has no right image" : read.depth_error};
+    if (read.frame->right.empty())
+      return {{}, read.depth_error.empty() ? "it has no right image" : read.depth_error};
     constexpr int kWindow = 5, kSmooth = kWindow * kWindow, kMostDifference = 1, kUnique = 10, kSpeck = 100;
     // Left and right must agree within kMostDifference.
-    const auto matcher = cv::StereoSGBM::create(0, disparities_, kWindow, 8 * kSmooth, 32 * kSmooth, kMostDifference, 0,
-                                                kUnique, kSpeck, 2);
+    const auto matcher = cv::StereoSGBM::create(0, disparities_, kWindow, 8 * kSmooth, 32 * kSmooth,
+                                                kMostDifference, 0, kUnique, kSpeck, 2);
     cv::Mat sixteenths;
     matcher->compute(read.frame->image, read.frame->right, sixteenths);
     const double scale = 16 * dataset_.Rig().camera.fx * dataset_.Rig().baseline_m;
@@ -70,7 +72,8 @@ class DepthFromFiles : public DepthSource {
   DepthFromFiles(const Dataset& dataset, const MapModel& model, const fs::path& folder) : model_(model) {
     std::error_code error;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-      if (entry.is_regular_file() && entry.path().filename().string().front() != '.') files_.push_back(entry.path());
+      if (entry.is_regular_file() && entry.path().filename().string().front() != '.')
+        files_.push_back(entry.path());
     }
     if (error) throw InputError("--depth " + folder.string() + ": " + error.message());
     std::sort(files_.begin(), files_.end(), [](const fs::path& a, const fs::path& b) {
@@ -82,8 +85,9 @@ class DepthFromFiles : public DepthSource {
       images = numbers_.back() + 1;
     }
     if (files_.size() < images)
-      throw InputError("--depth " + folder.string() + ": has " + std::to_string(files_.size()) + " files, but the data set " +
-                       std::to_string(images) + " images; give a depth image for each, in the order of their names");
+      throw InputError("--depth " + folder.string() + ": has " + std::to_string(files_.size()) +
+                       " files, but the data set " + std::to_string(images) +
+                       " images; give a depth image for each, in the order of their names");
     for (const ModelLandmark& landmark : model.landmarks) landmarks_[landmark.id] = landmark.position;
   }
 
@@ -93,8 +97,10 @@ class DepthFromFiles : public DepthSource {
     if (!read.error.empty()) return {{}, read.error};
     const cv::Size size(model_.camera.width, model_.camera.height);
     if (read.image.size() != size)
-      return {{}, file.string() + ": is " + std::to_string(read.image.cols) + "x" + std::to_string(read.image.rows) +
-                      ", the images are " + std::to_string(size.width) + "x" + std::to_string(size.height)};
+      return {{},
+              file.string() + ": is " + std::to_string(read.image.cols) + "x" +
+                  std::to_string(read.image.rows) + ", the images are " + std::to_string(size.width) + "x" +
+                  std::to_string(size.height)};
     cv::Mat depth;
     read.image.convertTo(depth, CV_32FC1);
     std::string problem;
@@ -112,20 +118,23 @@ class DepthFromFiles : public DepthSource {
     const Pose T_camera_world = keyframe.T_world_camera.Inverse();
     std::vector<double> ratios;
     for (const SeenLandmark& view : keyframe.views) {
-      const int u = static_cast<int>(std::lround(view.pixel.x)), v = static_cast<int>(std::lround(view.pixel.y));
+      const int u = static_cast<int>(std::lround(view.pixel.x)),
+                v = static_cast<int>(std::lround(view.pixel.y));
       if (u < 0 || v < 0 || u >= depth.cols || v >= depth.rows) continue;
       const auto there = static_cast<double>(depth.at<float>(v, u));
       const double z = (T_camera_world * landmarks_.at(view.landmark)).z();
       if (there > 0 && std::isfinite(there)) ratios.push_back(z / there);
     }
     if (ratios.size() < kLeast) {
-      *problem = "only " + std::to_string(ratios.size()) + " landmarks lie where it has depth; its scale is not known";
+      *problem = "only " + std::to_string(ratios.size()) +
+                 " landmarks lie where it has depth; its scale is not known";
       return 0;
     }
     const double median = internal::Median(ratios);
     for (double& ratio : ratios) ratio = std::abs(ratio / median - 1);
     if (const double scatter = internal::Median(ratios); scatter > kMostScatter) {
-      *problem = "its depth and that of the landmarks differ by " + std::to_string(std::lround(100 * scatter)) +
+      *problem = "its depth and that of the landmarks differ by " +
+                 std::to_string(std::lround(100 * scatter)) +
                  " % in the median after scaling; it is not depth along z, or not of this image";
       return 0;
     }
@@ -150,8 +159,10 @@ std::unique_ptr<DepthSource> OpenDepth(const Dataset& dataset, const MapModel& m
       return std::make_unique<StereoDepth>(dataset);
     default:
       throw InputError(
-          "one camera alone measures no depth. There are three ways to a dense map: a recording with depth images "
-          "(tutti run --sensor rgbd), one of a stereo camera (--sensor stereo), or --depth DIR with a depth image "
+          "one camera alone measures no depth. There are three ways to a dense map: a recording with depth "
+          "images "
+          "(tutti run --sensor rgbd), one of a stereo camera (--sensor stereo), or --depth DIR with a depth "
+          "image "
           "for each image, as a network makes them");
   }
 }

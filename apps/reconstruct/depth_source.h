@@ -34,10 +34,11 @@ class DepthSource {
   virtual bool KeyframesOnly() const { return false; }
 };
 
-/// The depth images of an RGB-D camera; those that semi-global matching finds in stereo pairs (H. Hirschmueller, PAMI
-/// 2008); or, with `folder`, those in it: as many files as the data set has images, in the order of their names, of
-/// the images' size, in any unit. The scale of each is the median over the landmarks that the keyframe sees. Throws
-/// InputError where there is no depth, with the ways to get some, and for a folder that does not fit.
+/// The depth images of an RGB-D camera; those that semi-global matching finds in stereo pairs (H.
+/// Hirschmueller, PAMI 2008); or, with `folder`, those in it: as many files as the data set has images, in
+/// the order of their names, of the images' size, in any unit. The scale of each is the median over the
+/// landmarks that the keyframe sees. Throws InputError where there is no depth, with the ways to get some,
+/// and for a folder that does not fit.
 std::unique_ptr<DepthSource> OpenDepth(const Dataset& dataset, const MapModel& model,
                                        const std::optional<std::filesystem::path>& folder);
 

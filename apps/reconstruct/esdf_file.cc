@@ -11,8 +11,8 @@
 namespace tutti {
 namespace {
 
-// OpenVDB gives each file a random identifier, behind magic number, versions and a flag. Here the same content has the
-// same bytes.
+// OpenVDB gives each file a random identifier, behind magic number, versions and a flag. Here the same
+// content has the same bytes.
 void SetIdentifier(const std::filesystem::path& file) {
   constexpr std::streamoff kAt = 8 + 3 * 4 + 1;
   std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
@@ -34,7 +34,8 @@ void WriteEsdf(const std::filesystem::path& file, const OccupiedSpace& space) {
   auto accessor = border->getAccessor();
   for (const Eigen::Vector3i& cell : space.free) accessor.setValue({cell.x(), cell.y(), cell.z()}, half);
   for (const Eigen::Vector3i& cell : space.occupied) accessor.setValue({cell.x(), cell.y(), cell.z()}, -half);
-  // The Eikonal equation over the cells that are known (H. Zhao, "A fast sweeping method for Eikonal equations", 2005).
+  // The Eikonal equation over the cells that are known (H. Zhao, "A fast sweeping method for Eikonal
+  // equations", 2005).
   const openvdb::FloatGrid::Ptr distances = openvdb::tools::sdfToSdf(*border);
   if (!distances) throw InputError(file.string() + ": OpenVDB found no distances: no cell is occupied");
   distances->setName("esdf");

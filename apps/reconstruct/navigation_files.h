@@ -11,12 +11,12 @@ namespace tutti {
 void RequireOctomap();
 void RequireOpenVdb();
 
-/// Writes OctoMap's binary tree (.bt; A. Hornung et al., "OctoMap", Autonomous Robots 2013), in the map frame. Throws
-/// InputError.
+/// Writes OctoMap's binary tree (.bt; A. Hornung et al., "OctoMap", Autonomous Robots 2013), in the map
+/// frame. Throws InputError.
 void WriteOctomap(const std::filesystem::path& file, const OccupiedSpace& space);
 
-/// Writes the distance of each known cell to the border of the nearest occupied one [m], negative inside, as the float
-/// grid "esdf" of OpenVDB, whose transform leads to the map frame. Throws InputError.
+/// Writes the distance of each known cell to the border of the nearest occupied one [m], negative inside, as
+/// the float grid "esdf" of OpenVDB, whose transform leads to the map frame. Throws InputError.
 void WriteEsdf(const std::filesystem::path& file, const OccupiedSpace& space);
 
 }  // namespace tutti

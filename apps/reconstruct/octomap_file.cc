@@ -27,8 +27,10 @@ void WriteOctomap(const std::filesystem::path& file, const OccupiedSpace& space)
   tree.prune();
   // As AbstractOccupancyOcTree::writeBinaryConst, which prints on the terminal.
   std::ostringstream bytes;
-  bytes << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
-        << "id " << tree.getTreeType() << "\nsize " << tree.size() << "\nres " << tree.getResolution() << "\ndata\n";
+  bytes << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first line as "
+           "it is!)\n#\n"
+        << "id " << tree.getTreeType() << "\nsize " << tree.size() << "\nres " << tree.getResolution()
+        << "\ndata\n";
   tree.writeBinaryData(bytes);
   internal::WriteFile(file, bytes.str());
 }
@@ -38,7 +40,8 @@ void WriteOctomap(const std::filesystem::path& file, const OccupiedSpace& space)
 namespace tutti {
 
 void RequireOctomap() {
-  throw InputError("--octomap: this tutti was built without OctoMap; install liboctomap-dev and build it again");
+  throw InputError(
+      "--octomap: this tutti was built without OctoMap; install liboctomap-dev and build it again");
 }
 void WriteOctomap(const std::filesystem::path&, const OccupiedSpace&) { RequireOctomap(); }
 

@@ -45,17 +45,19 @@ std::vector<PosedFrame> FramesOf(const MapModel& model, const Dataset& dataset, 
     frames.push_back({*place, pose.pose * T_body_camera, is_keyframe ? keyframe->second : nullptr});
   }
   if (frames.empty())
-    throw InputError("the data set has no frame of the map, by its time stamp; give the one that the map was made of");
+    throw InputError(
+        "the data set has no frame of the map, by its time stamp; give the one that the map was made of");
   return frames;
 }
 
 void RequireSameCamera(const PinholeCamera& a, const PinholeCamera& b) {
   constexpr double kSame = 1e-6;  // [px]
-  if (a.width == b.width && a.height == b.height && std::abs(a.fx - b.fx) < kSame && std::abs(a.fy - b.fy) < kSame &&
-      std::abs(a.cx - b.cx) < kSame && std::abs(a.cy - b.cy) < kSame)
+  if (a.width == b.width && a.height == b.height && std::abs(a.fx - b.fx) < kSame &&
+      std::abs(a.fy - b.fy) < kSame && std::abs(a.cx - b.cx) < kSame && std::abs(a.cy - b.cy) < kSame)
     return;
   throw InputError(
-      "the data set has another camera than the map (size, focal length or principal point); give the one that the "
+      "the data set has another camera than the map (size, focal length or principal point); give the one "
+      "that the "
       "map was made of");
 }
 
@@ -108,7 +110,8 @@ class Integration {
     if (!problem.empty())
       ++unread_;
     else
-      problem = map->Integrate(read.depth.depth_m, read.colour.image, frame.T_world_camera, dataset_.Rig().camera);
+      problem =
+          map->Integrate(read.depth.depth_m, read.colour.image, frame.T_world_camera, dataset_.Rig().camera);
     if (!problem.empty())
       progress_.Note("tutti: frame " + std::to_string(dataset_.Number(frame.place)) + ": " + problem,
                      "frames are skipped");
@@ -135,33 +138,37 @@ void WriteFiles(const DenseMap& map, const ReconstructionRequest& request, Recon
   if (request.cloud) {
     const PointCloud cloud = map.Cloud();
     WritePly(*request.cloud, cloud);
-    result->files.push_back({*request.cloud, Count(cloud.points.size(), "point") + " with colours and normals",
+    result->files.push_back({*request.cloud,
+                             Count(cloud.points.size(), "point") + " with colours and normals",
                              "CloudCompare, MeshLab; Open3D: read_point_cloud"});
   }
   if (!request.grid && !request.octomap && !request.esdf) return;
   const OccupiedSpace space = map.Space();
   if (!space.ground_found)
     result->warnings.emplace_back(
-        "no level ground was seen below the camera: heights are from the lowest surface, up is where the images' tops are");
+        "no level ground was seen below the camera: heights are from the lowest surface, up is where the "
+        "images' tops are");
   if (request.grid) {
     const OccupancyGrid grid = GridOf(space, request.low_m, request.robot_height_m);
     WriteGrid(*request.grid, grid);
     result->files.push_back({*request.grid / "map.yaml",
-                             std::to_string(grid.cells.cols) + "x" + std::to_string(grid.cells.rows) + " cells of " +
-                                 Metres(grid.cell_m) + ", obstacles from " + Metres(request.low_m) + " to " +
-                                 Metres(request.robot_height_m) + " above the ground",
+                             std::to_string(grid.cells.cols) + "x" + std::to_string(grid.cells.rows) +
+                                 " cells of " + Metres(grid.cell_m) + ", obstacles from " +
+                                 Metres(request.low_m) + " to " + Metres(request.robot_height_m) +
+                                 " above the ground",
                              "ros2 run nav2_map_server map_server --ros-args -p yaml_filename:=" +
                                  (*request.grid / "map.yaml").string()});
   }
-  const std::string cells = Count(space.occupied.size(), "occupied cell") + ", " + Count(space.free.size(), "free one");
+  const std::string cells =
+      Count(space.occupied.size(), "occupied cell") + ", " + Count(space.free.size(), "free one");
   if (request.octomap) {
     WriteOctomap(*request.octomap, space);
     result->files.push_back({*request.octomap, cells, "octovis " + request.octomap->string()});
   }
   if (request.esdf) {
     WriteEsdf(*request.esdf, space);
-    result->files.push_back(
-        {*request.esdf, "distances [m] of " + cells, "vdb_print " + request.esdf->string() + "; nvblox, Blender"});
+    result->files.push_back({*request.esdf, "distances [m] of " + cells,
+                             "vdb_print " + request.esdf->string() + "; Houdini, Blender"});
   }
 }
 
@@ -174,7 +181,8 @@ EnumWords<DenseFrames> WordsOf(DenseFrames) {
 void CheckReconstruction(const ReconstructionRequest& request) {
   if (!request.cloud && !request.mesh && !request.grid && !request.octomap && !request.esdf)
     throw InputError("there is nothing to make; give --mesh, --cloud, --grid, --octomap or --esdf");
-  if (const std::string problem = request.dense.Validate(); !problem.empty()) throw InputError("dense: " + problem);
+  if (const std::string problem = request.dense.Validate(); !problem.empty())
+    throw InputError("dense: " + problem);
   if (!(request.low_m < request.robot_height_m))
     throw InputError("--robot-height must be above " + Metres(request.low_m));
   if (request.octomap) RequireOctomap();
@@ -186,13 +194,16 @@ void CheckReconstruction(const ReconstructionRequest& request) {
   std::error_code error;
   fs::create_directories(*request.grid, error);
   if (error) throw InputError("--grid " + request.grid->string() + ": can't be made: " + error.message());
-  for (const char* name : {"map.pgm", "map.yaml"}) internal::CheckWritable(*request.grid / name, internal::Needs::kFile);
+  for (const char* name : {"map.pgm", "map.yaml"})
+    internal::CheckWritable(*request.grid / name, internal::Needs::kFile);
 }
 
-Reconstruction Reconstruct(const MapModel& model, const Dataset& dataset, const ReconstructionRequest& request) {
+Reconstruction Reconstruct(const MapModel& model, const Dataset& dataset,
+                           const ReconstructionRequest& request) {
   CheckReconstruction(request);
   if (dataset.FrameSupply() == Supply::kOnce)
-    throw InputError("the images of a camera come only once and are gone; record them, then run on the recording");
+    throw InputError(
+        "the images of a camera come only once and are gone; record them, then run on the recording");
   RequireSameCamera(dataset.Rig().camera, model.camera);
   const std::unique_ptr<DepthSource> source = OpenDepth(dataset, model, request.depth);
   const bool computed = request.depth || dataset.Rig().sensor != Sensor::kRgbd;
@@ -201,7 +212,8 @@ Reconstruction Reconstruct(const MapModel& model, const Dataset& dataset, const 
   std::vector<PosedFrame> frames = FramesOf(model, dataset, keyframes_only);
   Reconstruction result;
   if (!keyframes_only && frames.size() < dataset.Size())
-    result.warnings.push_back(Count(dataset.Size() - frames.size(), "frame") + " of the data set have no pose and are left out");
+    result.warnings.push_back(Count(dataset.Size() - frames.size(), "frame") +
+                              " of the data set have no pose and are left out");
   DenseOptions options = request.dense;
   options.free_space = request.grid || request.octomap || request.esdf;
   if (!request.quiet)
@@ -211,7 +223,8 @@ Reconstruction Reconstruct(const MapModel& model, const Dataset& dataset, const 
   const InterruptGuard guard;
   Integration(dataset, request, *source, std::move(frames)).Run(&map, &result);
   if (result.dense.integrated == 0)
-    throw InputError("no frame could be used" + std::string(result.interrupted ? ": interrupted" : "; nothing was written"));
+    throw InputError("no frame could be used" +
+                     std::string(result.interrupted ? ": interrupted" : "; nothing was written"));
   if (result.dense.cut > 0)
     result.warnings.push_back("the memory of --memory was used up: something is left out of " +
                               Count(result.dense.cut, "frame") + "; give more, or larger voxels (--voxel)");

@@ -44,14 +44,15 @@ struct Reconstruction {
   bool interrupted = false;  ///< the files have what was integrated until then
 };
 
-/// Throws InputError for what can be known before the images are read: nothing is asked for, a library is not there, a file
-/// can't be written.
+/// Throws InputError for what can be known before the images are read: nothing is asked for, a library is not
+/// there, a file can't be written.
 void CheckReconstruction(const ReconstructionRequest& request);
 
-/// Integrates the frames of the data set with the model's poses, in their order, and writes the files. Frames that
-/// can't be used are skipped and counted. Signals end it early, with the files written (InterruptGuard). Throws InputError
-/// as CheckReconstruction and OpenDepth, for a data set of another camera, for one without a frame of the model, and for
-/// files that can't be written.
-Reconstruction Reconstruct(const MapModel& model, const Dataset& dataset, const ReconstructionRequest& request);
+/// Integrates the frames of the data set with the model's poses, in their order, and writes the files. Frames
+/// that can't be used are skipped and counted. Signals end it early, with the files written (InterruptGuard).
+/// Throws InputError as CheckReconstruction and OpenDepth, for a data set of another camera, for one without
+/// a frame of the model, and for files that can't be written.
+Reconstruction Reconstruct(const MapModel& model, const Dataset& dataset,
+                           const ReconstructionRequest& request);
 
 }  // namespace tutti

@@ -24,12 +24,12 @@ struct SavedMap {
   MapModel model;
 };
 
-/// `session`: counted from 1; 0: the last one. Throws InputError as LoadMap does, and for a map without poses or without
-/// that session.
+/// `session`: counted from 1; 0: the last one. Throws InputError as LoadMap does, and for a map without poses
+/// or without that session.
 SavedMap ReadSavedMap(const std::filesystem::path& file, int session, SessionFrames frames);
 
-/// The data set of the session, or `dataset` where it is now (empty: where it was); without masks. Null if nothing says
-/// where it is, or it was a camera. Throws InputError as OpenDataset does.
+/// The data set of the session, or `dataset` where it is now (empty: where it was); without masks. Null if
+/// nothing says where it is, or it was a camera. Throws InputError as OpenDataset does.
 std::unique_ptr<Dataset> OpenRecording(const SavedMap& map, const std::string& dataset);
 
 }  // namespace tutti::cli

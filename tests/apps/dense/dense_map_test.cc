@@ -36,7 +36,8 @@ SyntheticOptions LapOfARoom(bool kinect_noise) {
 }
 
 // Every fourth frame of a lap.
-void Integrate(const testing::RenderedWorld& world, DenseMap* map, std::vector<Eigen::Vector3d>* seen = nullptr) {
+void Integrate(const testing::RenderedWorld& world, DenseMap* map,
+               std::vector<Eigen::Vector3d>* seen = nullptr) {
   for (std::size_t i = 0; i < world.Size(); i += 4) {
     const SyntheticFrame frame = world.Render(i);
     ASSERT_EQ(map->Integrate(frame.depth_m, frame.image, frame.T_world_camera, world.Camera()), "") << i;
@@ -163,9 +164,8 @@ TEST(DenseMap, BadFramesAreSkippedWithTheReasonAndLeaveTheMapAsItWas) {
   far.translation.x() = 1e9;
   PinholeCamera fisheye = Camera();
   fisheye.distortion = Distortion::kEquidistant;
-  const auto says = [&](const cv::Mat& depth, const cv::Mat& image, const Pose& pose, const PinholeCamera& camera) {
-    return map.Integrate(depth, image, pose, camera);
-  };
+  const auto says = [&](const cv::Mat& depth, const cv::Mat& image, const Pose& pose,
+                        const PinholeCamera& camera) { return map.Integrate(depth, image, pose, camera); };
   EXPECT_EQ(says({}, {}, Pose(), Camera()), "it has no depth image");
   EXPECT_EQ(says(cv::Mat(30, 40, CV_32FC1, cv::Scalar(1)), {}, Pose(), Camera()),
             "the depth image is 40x30, the camera 80x60");
@@ -175,7 +175,8 @@ TEST(DenseMap, BadFramesAreSkippedWithTheReasonAndLeaveTheMapAsItWas) {
   EXPECT_EQ(says(Wall(nan), {}, Pose(), Camera()), "its depth image is empty");
   EXPECT_EQ(says(Wall(1500), {}, Pose(), Camera()),
             "all its depth is beyond 200 m or max_depth_m; is its unit the metre?");
-  EXPECT_EQ(says(Wall(1), cv::Mat(30, 40, CV_8UC1), Pose(), Camera()), "the image is 40x30, the depth image 80x60");
+  EXPECT_EQ(says(Wall(1), cv::Mat(30, 40, CV_8UC1), Pose(), Camera()),
+            "the image is 40x30, the depth image 80x60");
   EXPECT_EQ(says(Wall(1), {}, lost, Camera()), "its pose is not finite");
   EXPECT_EQ(says(Wall(1), {}, far, Camera()), "its pose is farther away than a map reaches");
   EXPECT_EQ(says(Wall(1), {}, Pose(), fisheye), "the camera must have no distortion");
@@ -193,7 +194,8 @@ TEST(DenseMap, HolesAndNotANumberAreNoSurface) {
   for (int i = 0; i < 3; ++i) ASSERT_EQ(map.Integrate(depth, {}, Pose(), Camera()), "");
   const TriangleMesh mesh = map.Mesh();
   ASSERT_FALSE(mesh.vertices.points.empty());
-  for (const Eigen::Vector3f& point : mesh.vertices.points) EXPECT_GT(point.x(), 0.27F);  // pixel 60 is at 0.29 m
+  for (const Eigen::Vector3f& point : mesh.vertices.points)
+    EXPECT_GT(point.x(), 0.27F);  // pixel 60 is at 0.29 m
 }
 
 TEST(DenseMap, MemoryEndsWhereItWasToldAndTheReportSaysSo) {

@@ -33,8 +33,8 @@ double KnownGeometry::Distance(const Eigen::Vector3d& point) const {
   return least;
 }
 
-SurfaceQuality Measure(const PointCloud& surface, const KnownGeometry& geometry, const std::vector<Eigen::Vector3d>& seen,
-                       double within_m) {
+SurfaceQuality Measure(const PointCloud& surface, const KnownGeometry& geometry,
+                       const std::vector<Eigen::Vector3d>& seen, double within_m) {
   SurfaceQuality quality;
   std::map<Cell, std::vector<Eigen::Vector3d>> cells;
   double squares = 0, sum = 0;
@@ -61,7 +61,8 @@ SurfaceQuality Measure(const PointCloud& surface, const KnownGeometry& geometry,
     }
     covered += near ? 1 : 0;
   }
-  quality.completeness = static_cast<double>(covered) / static_cast<double>(std::max<std::size_t>(1, seen.size()));
+  quality.completeness =
+      static_cast<double>(covered) / static_cast<double>(std::max<std::size_t>(1, seen.size()));
   return quality;
 }
 

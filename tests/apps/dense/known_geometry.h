@@ -31,8 +31,8 @@ struct SurfaceQuality {
 };
 
 /// `seen`: points that the frames saw.
-SurfaceQuality Measure(const PointCloud& surface, const KnownGeometry& geometry, const std::vector<Eigen::Vector3d>& seen,
-                       double within_m);
+SurfaceQuality Measure(const PointCloud& surface, const KnownGeometry& geometry,
+                       const std::vector<Eigen::Vector3d>& seen, double within_m);
 
 /// Every `step`-th pixel of a depth image, in the world.
 void AppendSeen(const cv::Mat& depth_m, const Pose& T_world_camera, const PinholeCamera& camera, int step,

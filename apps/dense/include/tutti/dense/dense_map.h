@@ -23,16 +23,18 @@ namespace tutti {
 
 /// Options of DenseMap.
 struct DenseOptions {
-  TUTTI_OPTION(double, voxel_m, 0.02, "edge of a voxel: details smaller than it are lost, memory and time "
-               "grow with its inverse square", Basic(), Unit("m"), From(0.001), To(10));
+  TUTTI_OPTION(double, voxel_m, 0.02,
+               "edge of a voxel: details smaller than it are lost, memory and time "
+               "grow with its inverse square",
+               Basic(), Unit("m"), From(0.001), To(10));
   TUTTI_OPTION(double, max_depth_m, 0, "farther depth is not used; 0: no limit", Basic(), Unit("m"), From(0));
   TUTTI_OPTION(int, min_frames, 3, "a surface is there where so many frames have measured it", From(1),
                To(1000));
   TUTTI_OPTION(bool, free_space, true, "keep which space is free, for Space() and Grid()");
   TUTTI_OPTION(double, cell_m, 0, "edge of a cell of Space() and Grid(); 0: 0.05 m, at least 2.5 voxels",
                Unit("m"), From(0), To(50));
-  TUTTI_OPTION(int, memory_mb, 2000, "voxels take at most so much; what is new after that is left out", Basic(),
-               Unit("MB"), From(1));
+  TUTTI_OPTION(int, memory_mb, 2000, "voxels take at most so much; what is new after that is left out",
+               Basic(), Unit("MB"), From(1));
   TUTTI_OPTION(int, threads, 1, "at most so many; the result is the same for any number", From(1), To(1024));
   TUTTI_OPTIONS_END;
 
@@ -59,7 +61,8 @@ struct TriangleMesh {
 struct OccupiedSpace {
   double cell_m = 0;
   Pose T_map_world;
-  bool ground_found = false;              ///< false: up is against the cameras' y axes, and the ground the lowest that was seen
+  bool ground_found =
+      false;  ///< false: up is against the cameras' y axes, and the ground the lowest that was seen
   std::vector<Eigen::Vector3i> occupied;  ///< a surface runs through them; ascending by x, y, z
   std::vector<Eigen::Vector3i> free;      ///< seen through; ascending by x, y, z
 };
@@ -73,8 +76,8 @@ struct OccupancyGrid {
   cv::Mat cells;
 };
 
-/// The grid of the cells between `low_m` and `high_m` above the ground: occupied where one is, free where none is
-/// and one is free. Throws InputError unless low_m < high_m.
+/// The grid of the cells between `low_m` and `high_m` above the ground: occupied where one is, free where
+/// none is and one is free. Throws InputError unless low_m < high_m.
 OccupancyGrid GridOf(const OccupiedSpace& space, double low_m = 0.1, double high_m = 1.0);
 
 /// How far a DenseMap has come.
@@ -86,11 +89,11 @@ struct DenseReport {
   std::size_t cut = 0;         ///< frames of which something was left out, for memory_mb was reached
 };
 
-/// A truncated signed distance function (B. Curless, M. Levoy, "A volumetric method for building complex models
-/// from range images", SIGGRAPH 1996) in blocks of voxels that exist near surfaces alone (M. Niessner et al., "Real-time
-/// 3D reconstruction at scale using voxel hashing", SIGGRAPH Asia 2013). The band is four voxels to each side. A
-/// measurement at depth z has the weight of its variance, 1 / z^4, for the depth of stereo and structured light
-/// is uncertain by z^2. Poses are final: integrate after the last correction.
+/// A truncated signed distance function (B. Curless, M. Levoy, "A volumetric method for building complex
+/// models from range images", SIGGRAPH 1996) in blocks of voxels that exist near surfaces alone (M. Niessner
+/// et al., "Real-time 3D reconstruction at scale using voxel hashing", SIGGRAPH Asia 2013). The band is four
+/// voxels to each side. A measurement at depth z has the weight of its variance, 1 / z^4, for the depth of
+/// stereo and structured light is uncertain by z^2. Poses are final: integrate after the last correction.
 ///
 /// Frames in the same order give the same bytes for any number of threads.
 class DenseMap {

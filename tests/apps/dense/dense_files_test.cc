@@ -23,7 +23,7 @@ using testing::ReadAll;
 TriangleMesh OneTriangle() {
   TriangleMesh mesh;
   mesh.vertices.points = {{0, 0, 1}, {0, 2, 1}, {3, 0, 1}};
-  mesh.vertices.normals.assign(3, -Eigen::Vector3f::UnitZ());
+  mesh.vertices.normals.assign(3, Eigen::Vector3f(0, 0, -1));
   mesh.vertices.colours = {{{255, 0, 10}}, {{0, 200, 20}}, {{1, 2, 3}}};
   mesh.triangles = {{{0, 1, 2}}};
   return mesh;
@@ -161,9 +161,10 @@ class TrueCells {
 };
 
 double RightCellsOf(SyntheticScene scene, bool kinect_noise) {
-  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
+  SyntheticOptions options = testing::SmallRgbdRoom(160, 120);
   options.scene = scene;
   options.laps = 1;
+  options.corridor_m = 14;
   options.kinect_noise = kinect_noise;
   const testing::RenderedWorld world(options);
   DenseOptions dense;

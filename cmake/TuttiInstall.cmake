@@ -1,4 +1,4 @@
-# What is installed beside the libraries: find_package(tutti COMPONENTS core frontend loopclosure backend slam), documents
+# What is installed beside the libraries: find_package(tutti COMPONENTS core frontend loopclosure backend slam dense), documents
 # and configurations. Components of the installation are those of the Debian packages (TuttiPackages.cmake).
 include(CMakePackageConfigHelpers)
 configure_package_config_file(cmake/tuttiConfig.cmake.in

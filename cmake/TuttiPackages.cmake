@@ -49,6 +49,8 @@ endif()
 if(TUTTI_BUILD_SLAM)
   tutti_package(slam libtutti-slam-dev libdevel "visual SLAM as a C++ library
 Tracking, mapping and loop closure for one camera, stereo and RGB-D, as one class.")
+  tutti_package(dense libtutti-dense-dev libdevel "dense maps from depth images with poses
+A C++ library that makes coloured meshes, point clouds and occupancy grids.")
 endif()
 if(TUTTI_BUILD_APPS)
   tutti_package(program tutti science "visual SLAM with loop closure

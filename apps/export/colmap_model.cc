@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "apps/export/map_files.h"
+#include "core/little_endian.h"
 #include "core/numbers.h"
 #include "core/replaced_file.h"
 
@@ -53,7 +54,7 @@ class BinaryForm {
   explicit BinaryForm(const std::string& /*comment*/) {}
   template <class T>
   void Add(const T& number) {
-    AppendLittleEndian(number, &bytes_);
+    internal::AppendLittleEndian(number, &bytes_);
   }
   void Either(const char* /*name*/, int number) { Add(number); }
   void AddName(const std::string& name) { bytes_.append(name.c_str(), name.size() + 1); }

@@ -2,11 +2,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/little_endian.h"
 #include "core/numbers.h"
 #include "core/replaced_file.h"
 
 namespace tutti {
 namespace {
+
+using internal::AppendLittleEndian;
 
 constexpr std::array<std::uint8_t, 3> kOrange = {{213, 94, 0}};  // no colour of a scene that is often there
 constexpr std::uint32_t kCorners = 5;

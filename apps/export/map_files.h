@@ -1,28 +1,13 @@
 // A map as files of other programs: PLY (Stanford polygon format), and the transforms.json of nerfstudio.
 #pragma once
 
-#include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "apps/export/map_model.h"
 
 namespace tutti {
-
-/// Appends an integer, float or double, least significant byte first on any machine.
-template <class Number>
-void AppendLittleEndian(Number number, std::string* bytes) {
-  static_assert(std::is_arithmetic_v<Number> && sizeof(Number) <= 8);
-  std::conditional_t<sizeof(Number) == 8, std::uint64_t, std::uint32_t> bits = 0;
-  if constexpr (std::is_floating_point_v<Number>)
-    std::memcpy(&bits, &number, sizeof number);
-  else
-    bits = static_cast<decltype(bits)>(number);
-  for (std::size_t i = 0; i < sizeof number; ++i) bytes->push_back(static_cast<char>(bits >> (8 * i)));
-}
 
 /// kFrusta: behind the landmarks, each keyframe as a pyramid of 5 vertices and 6 triangles.
 enum class PlyCameras { kNone, kFrusta };

@@ -147,5 +147,6 @@ PYBIND11_MODULE(_tutti, module) {
   BindSlamSystem(module);
   BindTrajectoryCloser(module);
   BindEvaluation(module);
+  BindDenseMap(module);
   SetSignatures(module);
 }

@@ -94,6 +94,7 @@ const RunFile kFiles[] = {
     {"trajectory.svg", true, [](const RunResult& r, const fs::path& file) { WriteSvg(file, MakePlot(r)); }},
     {"trajectory.png", true, [](const RunResult& r, const fs::path& file) { WritePng(file, MakePlot(r)); }},
     {kMap, false, nullptr},
+    {kMesh, false, nullptr},
     {"report.html", false, nullptr},
     {"report.json", false, nullptr}};
 constexpr const char* kPiece = "trajectory_piece_";  // and a number: other pieces of the map

@@ -34,6 +34,7 @@ class Attempts {
 
 /// RunRequest::save_map of a map that lies beside the other results.
 constexpr const char* kMap = "map.tutti";
+constexpr const char* kMesh = "mesh.ply";  // of run --dense
 
 /// Where the frames of a run are in its map, for what draws them: positions of trajectory.txt, and of the
 /// keyframes that the map had before [m; one camera without a reference: in units of the first scale], after

@@ -6,13 +6,11 @@
 #include <utility>
 
 #include "apps/export/map_export.h"
-#include "apps/run/runner.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/options.h"
+#include "apps/tutti/saved_map.h"
 #include "tutti/core/error.h"
-#include "tutti/slam/map_file.h"
-#include "tutti/slam/slam_system.h"
 
 namespace tutti::cli {
 namespace {
@@ -25,28 +23,12 @@ struct ExportArguments {
   ExportRequest request;
 };
 
-fs::path MapFile(const std::string& run_or_map) {
-  std::error_code ignored;
-  if (!fs::is_directory(run_or_map, ignored)) return run_or_map;
-  fs::path file = fs::path(run_or_map) / "map.tutti";
-  if (!fs::exists(file, ignored))
-    throw InputError(file.string() +
-                     ": is not there; `tutti run` writes it when it has finished, unless it "
-                     "was told --no-map");
-  return file;
-}
-
 // Images are not needed for everything: where they can't be had, ExportMap says what it makes of that.
-std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapInfo& info,
-                                    const MapSession& session) {
+std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const SavedMap& map) {
   const ExportRequest& request = arguments.request;
   if (!request.landmarks && !request.colmap && !request.transforms) return nullptr;
-  const std::string path = arguments.dataset.empty() ? DatasetOfNote(session.note) : arguments.dataset;
-  if (path.empty() || IsCamera(path)) return nullptr;
-  DatasetOptions options = info.config.dataset;
-  options.mask.clear();  // colours and pictures are of the whole images
   try {
-    return OpenDataset(path, options);
+    return OpenRecording(map, arguments.dataset);
   } catch (const InputError& error) {
     if (!arguments.dataset.empty() || request.colmap || request.transforms) throw;
     SayWarnings({error.what()});
@@ -60,26 +42,10 @@ void RunExport(const ExportArguments& arguments) {
   for (const auto& out : {wanted.landmarks, wanted.transforms, wanted.g2o, wanted.tum})
     KeepInputs({file}, {out.value_or("")});
   for (const auto& out : {wanted.landmarks, wanted.g2o, wanted.tum}) CheckFiles({}, {out.value_or("")});
-  const MapInfo info = ReadMapInfo(file);
-  const std::unique_ptr<SlamSystem> slam = LoadMap(file, info);
-  if (slam->odometry() == nullptr)
-    throw InputError(file.string() +
-                     ": has no poses, since the camera had no calibration; nothing to export");
-  const std::size_t sessions = info.sessions.size();
-  if (static_cast<std::size_t>(arguments.session) > sessions)
-    throw InputError("--session " + std::to_string(arguments.session) + ": " + file.string() + " has " +
-                     std::to_string(sessions));
-  const std::size_t chosen = arguments.session > 0 ? static_cast<std::size_t>(arguments.session) : sessions;
-  const MapSession& session = info.sessions[chosen - 1];
-  FrameRange frames;
-  if (arguments.session > 0) {
-    frames.first = session.frame_offset;
-    if (chosen < sessions) frames.last = info.sessions[chosen].frame_offset - 1;
-  }
-  MapModel model = ModelOf(*slam->odometry(), slam->Graph(), frames);
-  model.image_offset = session.frame_offset;
-  const std::unique_ptr<Dataset> dataset = OpenImages(arguments, info, session);
-  const ExportReport report = ExportMap(std::move(model), dataset.get(), arguments.request);
+  SavedMap map = ReadSavedMap(file, arguments.session,
+                              arguments.session > 0 ? SessionFrames::kOfSession : SessionFrames::kAll);
+  const std::unique_ptr<Dataset> dataset = OpenImages(arguments, map);
+  const ExportReport report = ExportMap(std::move(map.model), dataset.get(), arguments.request);
   SayWarnings(report.warnings);
   for (const ExportedFile& written : report.files) {
     std::printf("%s: %s\n  open with: %s\n", written.path.c_str(), written.content.c_str(),
@@ -118,6 +84,7 @@ void SetUpExport(CLI::App& command, int&) {
             Positive());
   command.footer(
       "Poses are those after the last correction. Axes, units and programs: docs/formats.md.\n"
+      "Surfaces, dense clouds and grids to navigate in: tutti dense.\n"
       "A folder must be new, empty, or of an earlier export, which is replaced; files are overwritten.\n"
       "Examples:\n"
       "  tutti export result --landmarks map.ply\n"

@@ -6,12 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "apps/reconstruct/reconstruction.h"
 #include "apps/run/focal_length.h"
 #include "apps/run/outputs.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/recording_options.h"
 #include "apps/tutti/run_with_report.h"
+#include "apps/tutti/saved_map.h"
 #include "apps/tutti/text_table.h"
 #include "core/example_configs.h"
 #include "core/replaced_file.h"
@@ -33,14 +35,45 @@ struct RunArguments {
   CameraRequest camera;
   int rotate = 0;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
-  bool help_config = false, advanced = false, no_map = false;
+  bool help_config = false, advanced = false, no_map = false, dense = false;
   double follow_s = 10, checkpoint_s = 30;
   ViewOptions view;
   OutcomeOptions outcome;
 };
 
+// Before the run: what would make --dense impossible after it.
+void CheckDense(const RunArguments& arguments, const RunRequest& request, const RunConfig& config) {
+  if (!arguments.dense) return;
+  if (!request.save_map) throw InputError("run: --dense makes its mesh from the map; leave --no-map away");
+  if (IsCamera(arguments.dataset))
+    throw InputError("run: --dense reads the images again, and those of a camera come once; record them");
+  if (config.dataset.sensor == Sensor::kMono)
+    throw InputError(
+        "run: --dense needs depth or stereo images; with one camera, give tutti dense --depth DIR after the "
+        "run");
+}
+
+// OUT/mesh.ply, with the poses after the last correction.
+void MakeDense(const RunRequest& request, const RunResult& result, const RunConfig& config) {
+  const fs::path map_file = *request.save_map == kMap ? fs::path(result.folder) / kMap : *request.save_map;
+  const SavedMap map = ReadSavedMap(map_file, 0, SessionFrames::kOfSession);
+  const std::unique_ptr<Dataset> dataset = OpenRecording(map, request.dataset.string());
+  ReconstructionRequest dense;
+  dense.mesh = fs::path(result.folder) / kMesh;
+  dense.dense.threads = request.threads.value_or(config.run.threads);
+  dense.quiet = request.quiet;
+  const Reconstruction made = Reconstruct(map.model, *dataset, dense);
+  SayWarnings(made.warnings);
+  for (const ExportedFile& written : made.files)
+    std::printf("  mesh: %s; tutti dense %s makes grids, clouds and finer ones\n", written.content.c_str(),
+                internal::Printable(result.folder.string()).c_str());
+}
+
 int RunAndShow(const RunArguments& arguments, const RunRequest& request, const RunConfig& config) {
+  CheckDense(arguments, request, config);
   const RunResult result = RunAndPrint(request, config, arguments.outcome);
+  if (arguments.dense && !result.interrupted && !result.trajectory.empty())
+    MakeDense(request, result, config);
   if (request.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
     if (result.odometry_alone_cpu_s > 0)
@@ -245,6 +278,10 @@ void SetUpRun(CLI::App& command, int& exit_code) {
           "Without --config, the map's configuration is used");
   command.add_flag("--no-map", arguments->no_map, "don't write the map (OUT/map.tutti)");
   AddPath(command, "--save-map", request.save_map, "write the map to this file instead of OUT/map.tutti");
+  command.add_flag(
+      "--dense", arguments->dense,
+      "at the end make a mesh of the depth or stereo images, with the corrected poses (OUT/mesh.ply, voxels "
+      "of 2 cm); `tutti dense OUT` makes it with other options, clouds and grids");
   AddOption(
       command, "--checkpoint", arguments->checkpoint_s,
       "while running, write OUT/checkpoint.tutti at most every SECONDS (default 30), from which --resume "

@@ -14,9 +14,9 @@ namespace tutti::cli {
 /// Adds the options of a command, and a callback that does the work, sets the exit status, and may throw
 /// InputError, which RunProgram prints as one line. Names and sentences: program.cc.
 using SetUp = void(CLI::App& command, int& exit_code);
-SetUp SetUpRun, SetUpLocalize, SetUpMerge, SetUpExport, SetUpMap, SetUpCalibrateCheck, SetUpEvaluate,
-    SetUpConvert, SetUpPlot, SetUpClose, SetUpCompare, SetUpCollect, SetUpLoops, SetUpCompareLoops,
-    SetUpOptimize, SetUpGenerate, SetUpDemo;
+SetUp SetUpRun, SetUpLocalize, SetUpMerge, SetUpExport, SetUpDense, SetUpMap, SetUpCalibrateCheck,
+    SetUpEvaluate, SetUpConvert, SetUpPlot, SetUpClose, SetUpCompare, SetUpCollect, SetUpLoops,
+    SetUpCompareLoops, SetUpOptimize, SetUpGenerate, SetUpDemo;
 
 /// Reads the command line, calls the command, and returns the exit status of the process. `own`: the commands
 /// of this program, by name; each is in the list of all commands, which the help shows. A command of the list

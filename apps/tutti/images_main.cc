@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
                      {"map", SetUpMap},
                      {"localize", SetUpLocalize},
                      {"export", SetUpExport},
+                     {"dense", SetUpDense},
                      {"merge", SetUpMerge},
                      {"close", SetUpClose}},
                     nullptr);

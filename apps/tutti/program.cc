@@ -54,6 +54,7 @@ constexpr Command kCommands[] = {
     {"merge", "two maps with common places become one"},
     {"map", "what is in a map file: keyframes, landmarks, loops, size, extent"},
     {"export", "a saved map for other programs: PLY, COLMAP, nerfstudio, g2o, TUM"},
+    {"dense", "a coloured mesh, a cloud, or a grid to navigate in, from depth or stereo images"},
     {"calibrate-check",
      "can the calibration be right? Measures field of view, principal point, rows and order of stereo pairs, "
      "depth unit; exit status 1 if something can't be"},

@@ -418,6 +418,17 @@ SyntheticFrame SyntheticWorld::RenderFrom(std::size_t i, const Pose& T_world_cam
   return impl_->Frame(i, T_world_camera, left, right);
 }
 
+std::vector<synthetic::Face> StillFaces(const SyntheticWorld& world) {
+  std::vector<synthetic::Face> faces = world.impl_->scene.faces;
+  const Pose T_world_scene = world.impl_->T_scene_first.Inverse();
+  for (synthetic::Face& face : faces) {
+    face.corner = T_world_scene * face.corner;
+    face.edge_u = T_world_scene.rotation * face.edge_u;
+    face.edge_v = T_world_scene.rotation * face.edge_v;
+  }
+  return faces;
+}
+
 cv::Mat SyntheticWorld::ExactDepth(std::size_t i) const {
   const double t = Stamp(i);
   return impl_->ViewFrom(impl_->camera, impl_->CameraAt(t), t, 0).depth_m;

@@ -14,6 +14,10 @@
 
 namespace tutti {
 
+namespace synthetic {
+struct Face;
+}
+
 /// One rendered frame. The same as what is written to disk, except that depth is not rounded to 16 bit.
 struct SyntheticFrame {
   double stamp_s = 0;
@@ -55,9 +59,13 @@ class SyntheticWorld {
   cv::Mat ExactDepth(std::size_t i) const;
 
  private:
+  friend std::vector<synthetic::Face> StillFaces(const SyntheticWorld& world);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// The exact geometry: all that does not move, in the world of the poses (data/synthetic/rasterizer.h).
+std::vector<synthetic::Face> StillFaces(const SyntheticWorld& world);
 
 /// How a world is written to disk.
 struct SyntheticWriteOptions {

@@ -15,7 +15,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// What a folder holds, by the names in it alone; it looks into no folder further down than a layout has its own.
+std::optional<DatasetType> FolderType(const fs::path& path) {
+  std::error_code code;
+  const auto folder = [&](const char* name) { return fs::is_directory(path / name, code); };
+  const auto file = [&](const char* name) { return fs::is_regular_file(path / name, code); };
+  if (folder("mav0/cam0") || file("cam0/sensor.yaml")) return DatasetType::kEuroc;
+  if (folder("image_0") || folder("image_2")) return DatasetType::kKitti;
+  if (file("rgb.txt") || file("associations.txt") || file("color.txt")) return DatasetType::kTum;
+  if (IsStrayScanner(path) || FindLayout(path)) return DatasetType::kPaired;
+  if (!ListImages(path).empty()) return DatasetType::kImages;
+  if (!Bag::Files(path).empty()) return DatasetType::kBag;
+  return std::nullopt;
+}
+
 std::optional<DatasetType> DetectedType(const fs::path& path) {
+  std::error_code code;
+  if (fs::is_directory(path, code)) return FolderType(path);
   try {
     return DetectDatasetType(path);
   } catch (const InputError&) {
@@ -162,14 +178,7 @@ DatasetType DetectDatasetType(const fs::path& path) {
     const auto bags = {".bag", ".mcap", ".db3", ".zstd"};  // the last one: packed, which Bag::Open says
     return std::find(bags.begin(), bags.end(), type) != bags.end() ? DatasetType::kBag : DatasetType::kVideo;
   }
-  const auto folder = [&](const char* name) { return fs::is_directory(path / name, code); };
-  const auto file = [&](const char* name) { return fs::is_regular_file(path / name, code); };
-  if (folder("mav0/cam0") || file("cam0/sensor.yaml")) return DatasetType::kEuroc;
-  if (folder("image_0") || folder("image_2")) return DatasetType::kKitti;
-  if (file("rgb.txt") || file("associations.txt") || file("color.txt")) return DatasetType::kTum;
-  if (IsStrayScanner(path) || FindLayout(path)) return DatasetType::kPaired;
-  if (!ListImages(path).empty()) return DatasetType::kImages;
-  if (!Bag::Files(path).empty()) return DatasetType::kBag;
+  if (const std::optional<DatasetType> type = FolderType(path)) return *type;
   const fs::directory_iterator entries(path, code);
   if (code)
     throw InputError(path.string() + ": can't be listed (" + code.message() + "); check its permissions");

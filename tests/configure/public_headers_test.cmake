@@ -1,7 +1,7 @@
 # Every public header exports what it declares: a shared library would hide what stands outside of its visibility pragmas.
 # usage: cmake -DTUTTI=source -P public_headers_test.cmake
 set(headers "")
-foreach(module core frontend loopclosure backend apps/slam)
+foreach(module core frontend loopclosure backend apps/slam apps/dense)
   file(GLOB_RECURSE found "${TUTTI}/${module}/include/tutti/*.h")
   list(APPEND headers ${found})
 endforeach()

@@ -1,4 +1,5 @@
-"""Visual SLAM and loop closure: LoopDetector, SlamSystem, TrajectoryCloser, PoseGraph, evaluate, Dataset.
+"""Visual SLAM and loop closure: LoopDetector, SlamSystem, TrajectoryCloser, PoseGraph, DenseMap, evaluate,
+Dataset.
 
 Arrays are numpy's. T_a_b maps points of frame b into frame a; the camera looks along z, x is right, y is down. Lengths
 are metres (one camera: units of the map), times seconds, angles radians unless a name says _deg. Wrong input raises

@@ -1,0 +1,1 @@
+find_dependency(OpenCV 4.5.4 COMPONENTS core imgproc)

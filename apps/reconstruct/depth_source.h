@@ -1,0 +1,45 @@
+// Where the depth of a frame comes from: the sensor, two images, or files that someone else made.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+#include "apps/export/map_model.h"
+#include "tutti/frontend/dataset.h"
+
+namespace tutti {
+
+/// A frame that has a pose.
+struct PosedFrame {
+  std::size_t place = 0;  ///< in the data set, for Dataset::Read
+  Pose T_world_camera;
+  const ModelKeyframe* keyframe = nullptr;  ///< null: it is none
+};
+
+/// A depth image, or why there is none.
+struct DepthImageRead {
+  cv::Mat depth_m;    ///< CV_32FC1 [m; one camera: in units of the map], 0: no measurement
+  std::string error;  ///< empty if there is a depth image
+};
+
+/// Gives depth images. Thread-safe.
+class DepthSource {
+ public:
+  virtual ~DepthSource() = default;
+  virtual DepthImageRead Read(const PosedFrame& frame) const = 0;
+  /// True if only keyframes can have depth.
+  virtual bool KeyframesOnly() const { return false; }
+};
+
+/// The depth images of an RGB-D camera; those that semi-global matching finds in stereo pairs (H.
+/// Hirschmueller, PAMI 2008); or, with `folder`, those in it: as many files as the data set has images, in
+/// the order of their names, of the images' size, in any unit. The scale of each is the median over the
+/// landmarks that the keyframe sees. Throws InputError where there is no depth, with the ways to get some,
+/// and for a folder that does not fit.
+std::unique_ptr<DepthSource> OpenDepth(const Dataset& dataset, const MapModel& model,
+                                       const std::optional<std::filesystem::path>& folder);
+
+}  // namespace tutti

@@ -46,6 +46,17 @@ TEST_F(MonoInitializerTest, WaitsWhileATurnAndASidewaysStepLookTheSame) {
   EXPECT_TRUE(Start(0.14, bold)) << reason_;
 }
 
+// The camera turns by 6 deg a frame while it moves: the first view is soon out of sight.
+TEST_F(MonoInitializerTest, AYoungerViewTakesThePlaceOfOneThatIsOutOfSight) {
+  MonoInitializer initializer(OdometryOptions(), Rig());
+  Map map(PyramidScales(OdometryOptions()));
+  EXPECT_FALSE(initializer.Offer(Frame(Moved(0, 0, 0.5), 0), 0, Pose(), 1, &map, &reason_));
+  EXPECT_FALSE(initializer.Offer(Frame(Moved(0.02, 0, 0.1), 0.3), 0, Pose(), 1, &map, &reason_));
+  EXPECT_FALSE(initializer.Offer(Frame(Moved(0.04, 0, 0.08), 0.6), 0, Pose(), 1, &map, &reason_));
+  EXPECT_TRUE(initializer.Offer(Frame(Moved(0.6, 0, -0.5), 0.9), 0, Pose(), 1, &map, &reason_)) << reason_;
+  EXPECT_NEAR(map.keyframe(0).stamp_s, 0.3, 1e-9);
+}
+
 TEST_F(MonoInitializerTest, KeepsTheFramesThatWait) {
   MonoInitializer initializer(OdometryOptions(), Rig());
   Map map(PyramidScales(OdometryOptions()));

@@ -341,6 +341,7 @@ void Odometry::Impl::TrackLost() {
   std::vector<LastFrame> found;
   int failed = 0;  // one after the other
   for (auto frame = lost.rbegin(); frame != lost.rend() && failed < kMostFailed; ++frame) {
+    if (frame->index == last().frame.index) continue;  // it is the one that was found
     const bool posed = backwards.Track(*frame, map()).fix.has_value();
     failed = posed ? 0 : failed + 1;
     if (posed) found.push_back(backwards.last());

@@ -23,6 +23,7 @@ constexpr int kAskAgain = 8;            // frames, after which the exposure may 
 constexpr double kManyInliers = 3;      // that outweigh grey values, in units of those that a pose needs
 constexpr int kMostByGrey = 300;        // frames in a row that grey values alone pose
 constexpr double kDepthHolds = 0.5;     // a depth image, aligned with the one before by its surfaces [s]
+constexpr int kLeastWithDepth = 50;     // features that make a keyframe where no landmark is found
 constexpr double kLongestByDepth = 2;   // that a camera goes on before a plain surface [s]
 constexpr double kFastestTurn = 10;     // [rad/s]
 constexpr double kFastestMove = 2;      // [1/s], in units of the depth of what is in view
@@ -245,7 +246,12 @@ std::optional<PoseFix> RollingSearch::ByGreyValues(const Map& map, const Tracked
   if (shutter_.RowsTell()) better.camera.motion = found->motion;
   if (auto fix = Near(map, frame, last, better)) return fix;
   PoseFix fix = FixByGrey(frame, last, better);
-  fix.sharp = last.exposure.IsKnown();
+  // A slow camera's images are sharp whatever the exposure; the view changes while the map stays behind.
+  const auto& depths = frame.features->inverse_depth;
+  const bool new_landmarks =
+      std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0; }) >= kLeastWithDepth;
+  const bool slow = SpeedOf(last.motion, expected.depth) * kLongExposure <= kBlurred;
+  fix.sharp = last.exposure.IsKnown() || (slow && new_landmarks);
   return fix;
 }
 

@@ -219,15 +219,15 @@ std::optional<CameraMotion> RollingSearch::ByDepth(const TrackedFrame& frame, co
                                                    const Expected& expected) const {
   const double dt = frame.Time() - last.frame.Time();
   const auto &before = last.frame.features->depth_grid, &now = frame.features->depth_grid;
-  if (!(dt > 0 && dt < kDepthHolds) || !before || !now || !last.velocity) return std::nullopt;
+  if (!(dt > 0 && dt < kDepthHolds) || !before || !now || !last.mean_velocity) return std::nullopt;
   const Vector6d sigma = dt * Sigma(dt, expected.depth);
-  const auto aligned =
-      AlignDepth(shutter_, {*before, last.motion}, {*now, *last.velocity}, ExpSE3(*last.velocity * dt),
-                 Matrix6d(sigma.cwiseAbs2().cwiseInverse().asDiagonal()), options_.rgbd_inverse_sigma);
+  const auto aligned = AlignDepth(
+      shutter_, {*before, last.motion}, {*now, *last.mean_velocity}, ExpSE3(*last.mean_velocity * dt),
+      Matrix6d(sigma.cwiseAbs2().cwiseInverse().asDiagonal()), options_.rgbd_inverse_sigma);
   if (!aligned) return std::nullopt;
   CameraMotion found;
   found.T_camera_world = aligned->T_second_first * last.T_camera_world;
-  found.motion = *last.velocity;
+  found.motion = *last.mean_velocity;
   return found;
 }
 

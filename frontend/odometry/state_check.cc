@@ -172,6 +172,7 @@ void Tracker::Check(const Map& map, const SectionReader& file) const {
   CheckPose(last_.T_camera_world, file);
   CheckLandmarks(last_.matches.landmarks, map, file);
   if (last_.velocity && !last_.velocity->allFinite()) file.Damaged("a velocity that is none");
+  if (last_.mean_velocity && !last_.mean_velocity->allFinite()) file.Damaged("a velocity that is none");
   const bool has_frame = last_.reference >= 0;
   if (has_frame) CheckFeatures(last_.frame.features, map, file);
   const std::size_t features = has_frame ? last_.frame.features->size() : 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "frontend/features/features.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_room.h"

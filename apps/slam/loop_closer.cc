@@ -59,6 +59,7 @@ LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecord
       options_(config.run),
       rig_(rig),
       detector_(config.loops),
+      pixel_sigma_(config.odometry.pixel_sigma),
       followed_(config.run, rig.sensor),
       gate_(config.run),
       graph_(GraphOptions(config, rig.sensor)) {

@@ -103,6 +103,7 @@ class LoopCloser {
  private:
   friend class MapMerge;        // shows the places of one map to the detector of the other
   friend class MapConnection;   // adjusts the map until it converges
+  friend class SubmapJoiner;    // asks which keyframes are of one recording
   friend class MapFile;         // saves it
   friend class LoopCloserPeer;  // tests its decisions one by one
 
@@ -159,6 +160,7 @@ class LoopCloser {
   bool LeavesAsItIs(const std::vector<std::size_t>& loops, const Map& map) const;
   void JudgeJumps(const Map& map, bool all);
   void SetSigmas();
+  void NoteSteps(const Map& map);
   std::vector<CovisiblePair> Covisible(const Map& map) const;
   void Rescale(const std::map<int, Similarity>& S_world_keyframe);
   bool OfOneSession(std::int64_t frame, std::int64_t other) const;
@@ -182,6 +184,7 @@ class LoopCloser {
   SlamOptions options_;
   CameraRig rig_;
   LoopDetectorOptions detector_;
+  double pixel_sigma_;                  // of a corner [px]
   std::unique_ptr<LoopWorker> worker_;  // null: no loops
   std::deque<Submission> submitted_;
   std::optional<LateLoop> late_;                   // came with the last answer, and is considered next

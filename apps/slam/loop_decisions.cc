@@ -5,6 +5,7 @@
 
 #include "apps/slam/loop_closer.h"
 #include "apps/slam/loop_reach.h"
+#include "apps/slam/weak_steps.h"
 #include "core/stopwatch.h"
 #include "loopclosure/detector/hypothesis_search.h"
 
@@ -121,7 +122,9 @@ LoopCloser::Update LoopCloser::Consider(Loop proposed, const Verification& verif
   Loop& loop = loops_.back();
   if (!loop.verified && !IsWitness(loop, verification)) return {};
   const std::string doubt = loop.reason;  // of the detector
-  const bool recent = OfOneSession(loop.query, loop.candidate) &&
+  // What holds a submap to the others may well be what was seen just before.
+  const bool recent = map.keyframe(query).piece == map.keyframe(candidate).piece &&
+                      OfOneSession(loop.query, loop.candidate) &&
                       loop.query_stamp_s - loop.candidate_stamp_s < options_.loop_min_age_s;
   const auto reject = [&loop](const std::string& reason) {
     loop.reason = reason;
@@ -264,9 +267,17 @@ void LoopCloser::Solve(const std::vector<std::size_t>& entering, const Odometry&
   solved_keyframes_ = KeyframesOf(odometry.map());
   graph_.Update(solved_keyframes_, Covisible(odometry.map()));
   SetSigmas();
+  NoteSteps(odometry.map());
   solver_.Start(graph_, EdgesOf(InState(LoopState::kInMap)), EdgesOf(entering), options_, recorder_);
   solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
   stages_["loop_optimize"] += watch.Milliseconds();
+}
+
+// Steps are judged once, before loops move them. A followed odometry says itself how certain it is.
+void LoopCloser::NoteSteps(const Map& map) {
+  if (followed_.begun()) return;
+  for (const auto& [keyframe, sigma] : StepSigmas(map, graph_.LastNoted(), pixel_sigma_))
+    graph_.NoteMotion(keyframe, sigma);
 }
 
 bool LoopCloser::MayMove(std::int64_t frames) const {

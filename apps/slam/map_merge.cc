@@ -7,6 +7,7 @@
 
 #include "apps/slam/joining_loops.h"
 #include "apps/slam/loop_constraint.h"
+#include "apps/slam/loop_reach.h"
 #include "apps/slam/map_connection.h"
 #include "apps/slam/map_state.h"
 #include "frontend/map/append.h"
@@ -85,7 +86,7 @@ void MapMerge::AppendLoops() {
 }
 
 bool MapMerge::Join(std::int64_t frames, std::string* reason) {
-  *reason = Close(LoopsBetween(), frames);
+  *reason = Close(LoopsBetween(), config_, frames, &map_.loops, map_.odometry);
   map_.loops.Finish(&map_.odometry, frames);
   const Map& map = map_.odometry.map();
   const std::vector<int> ids = map.KeyframeIds();
@@ -99,10 +100,10 @@ bool MapMerge::Join(std::int64_t frames, std::string* reason) {
   return true;
 }
 
-// The loops that join the two maps, all at once. Why none does; empty: the graph is being solved with them.
-std::string MapMerge::Close(const std::vector<Proposal>& proposed, std::int64_t frames) {
-  LoopCloser& closer = map_.loops;
-  const Map& map = map_.odometry.map();
+std::string MapMerge::Close(const std::vector<Proposal>& proposed, const RunConfig& config,
+                            std::int64_t frames, LoopCloser* loops, const Odometry& odometry) {
+  LoopCloser& closer = *loops;
+  const Map& map = odometry.map();
   std::vector<LoopEdge> edges;
   for (const Proposal& proposal : proposed) {
     closer.loops_.push_back(proposal.loop);
@@ -115,18 +116,32 @@ std::string MapMerge::Close(const std::vector<Proposal>& proposed, std::int64_t 
     loop.edge = constraint.edge;
     loop.edge.record = closer.loops_.size() - 1;
     loop.S_candidate_query = loop.edge.S_candidate_query;
-    edges.push_back(loop.edge);
+    if (closer.OfOneSession(loop.query, loop.candidate))
+      loop.reason = WhyImpossible(loop.edge, map, closer.rig_.sensor);
+    if (loop.reason.empty()) edges.push_back(loop.edge);
   }
-  const JoiningLoops joining = ChooseJoiningLoops(edges, PlacesIn(map), closer.Graph(map), config_.run);
+  JoiningLoops joining = ChooseJoiningLoops(edges, PlacesIn(map), closer.Graph(map), config.run);
+  const auto differs = [&](std::size_t i, std::size_t j) {
+    const auto piece = [&](int keyframe) { return map.keyframe(keyframe).piece; };
+    return piece(edges[i].candidate) == piece(edges[j].candidate) &&
+           piece(edges[i].query) == piece(edges[j].query) &&
+           LoopGate::Independent(edges[i], edges[j], PlacesIn(map));
+  };
+  std::vector<std::size_t> entering;
+  for (const std::size_t i : joining.chosen) {
+    const bool one_recording = closer.OfOneSession(edges[i].query_frame, edges[i].candidate_frame);
+    const bool proven = !one_recording || std::any_of(joining.chosen.begin(), joining.chosen.end(),
+                                                      [&](std::size_t j) { return differs(i, j); });
+    if (!proven) joining.reasons[i] = "the loops that agree with it have all seen the same";
+    if (proven) entering.push_back(edges[i].record);
+  }
   for (std::size_t i = 0; i < edges.size(); ++i) {
     Loop& loop = closer.loops_[edges[i].record];
     loop.reason = joining.reasons[i];
     if (!loop.reason.empty()) closer.Revoke(&loop);
   }
-  std::vector<std::size_t> entering;
-  for (const std::size_t i : joining.chosen) entering.push_back(edges[i].record);
   for (const std::size_t loop : entering) closer.loops_[loop].untied = true;
-  if (!entering.empty()) closer.Solve(entering, map_.odometry, frames);
+  if (!entering.empty()) closer.Solve(entering, odometry, frames);
   return joining.reason;
 }
 

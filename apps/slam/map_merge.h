@@ -62,12 +62,18 @@ class MapMerge {
       std::vector<LoopPlace> places, std::int64_t first_frame,
       const std::function<std::optional<KeyframeView>(std::int64_t frame)>& view, LoopCloser* loops);
 
+  /// Loops between submaps: those join them that ChooseJoiningLoops says, all at once; the graph is being
+  /// solved with them. Within one recording the camera must have been able to get from the one place to the
+  /// other while it was lost (WhyImpossible), and two of the loops must have seen different things. Returns
+  /// why no loop joins any; empty: some do.
+  static std::string Close(const std::vector<Proposal>& proposed, const RunConfig& config,
+                           std::int64_t frames, LoopCloser* loops, const Odometry& odometry);
+
  private:
   void AppendLoops();
   std::vector<Proposal> LoopsBetween();
   std::vector<Proposal> ProposedByMap();
   std::vector<Proposal> ProposedByOther();
-  std::string Close(const std::vector<Proposal>& proposed, std::int64_t frames);
 
   const RunConfig& config_;
   MapToMerge map_, other_;

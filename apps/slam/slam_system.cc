@@ -12,6 +12,7 @@
 #include "apps/slam/map_reference.h"
 #include "apps/slam/map_state.h"
 #include "apps/slam/session_list.h"
+#include "apps/slam/submap_joiner.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
 #include "frontend/map/append.h"
@@ -141,6 +142,7 @@ class SlamSystem::Impl {
       SubmitMapped();
     }
     loops_.Finish(mutable_odometry(), frames_);
+    if (odometry_) JoinSubmaps();
     if (odometry_) sessions_.NoteJoined(*odometry_);
   }
 
@@ -223,6 +225,12 @@ class SlamSystem::Impl {
 
   Odometry* mutable_odometry() { return odometry_ ? &*odometry_ : nullptr; }
   MapToMerge ToMerge() { return {rig_, loops_, sessions_, *odometry_}; }
+
+  void JoinSubmaps() {
+    const int keyframes = odometry_->map().KeyframeCount();
+    if (!config_.run.loops || std::exchange(searched_, keyframes) == keyframes) return;
+    SubmapJoiner(config_, frames_, &loops_, &*odometry_).Join();
+  }
 
   // What is due by now.
   void Begin() {
@@ -355,6 +363,7 @@ class SlamSystem::Impl {
   std::map<std::string, double> stages_;
   std::vector<std::string> warnings_;  // not taken yet
   std::int64_t frames_ = 0;
+  int searched_ = 0;        // keyframes that submaps were joined by
   std::int64_t last_ = -1;  // index of the last frame that the odometry has seen
 };
 

@@ -337,6 +337,9 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
                "town: part of the signs that are there [0..1]; no two look alike");
   AddDefaulted(c, "--roads", w.road_surfaces,
                "town: number of road surfaces that differ; few are aliasing, too");
+  AddDefaulted(c, "--bare", w.bare_fraction, "room: part of each wall behind a plain curtain [0..1]");
+  AddDefaulted(c, "--plain-doors", w.plain_doors,
+               "room: doors of plain paint beside the way, some 0.3 m from it at the nearest [0..4]");
   AddDefaulted(c, "--corridor", w.corridor_m,
                "corridor: longer side of the ring [m]; the other is half of it");
   AddDefaulted(c, "--sides", w.sides_deg, "sensor sides: each camera looks so far from the way [deg]");

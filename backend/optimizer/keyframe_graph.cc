@@ -141,6 +141,9 @@ void KeyframeGraph::Append(int first_keyframe, const KeyframeGraph* other) {
   MeasureAgain();
   sessions_.push_back(first_keyframe);
   if (other == nullptr) return;
+  const Eigen::Vector2d before = walked_.empty() ? Eigen::Vector2d::Zero() : walked_.back().second;
+  for (const auto& [keyframe, walked] : other->walked_)
+    walked_.emplace_back(first_keyframe + keyframe, before + walked);
   for (const int begin : other->sessions_) sessions_.push_back(first_keyframe + begin);
 }
 
@@ -411,6 +414,12 @@ void KeyframeGraph::Move(const std::map<int, Similarity>& S_world_keyframe,
                                   ScaleOf(S_world_keyframe, edge.newer));
   }
   kept_ = edges_;
+  Eigen::Vector2d before = Eigen::Vector2d::Zero(), scaled = Eigen::Vector2d::Zero();
+  for (auto& [keyframe, walked] : walked_) {
+    const double scale = ScaleOf(S_world_keyframe, keyframe);
+    scaled += (walked - before).cwiseProduct(Eigen::Vector2d(scale * scale, 1));
+    before = std::exchange(walked, scaled);
+  }
   for (Edge& edge : carried_) edge.way *= ScaleOf(S_world_keyframe, edge.older);
   for (const auto& [from, to] : merges) {
     if (from != to) merged_.push_back({from, to, keyframes_.empty() ? -1 : keyframes_.back().id});

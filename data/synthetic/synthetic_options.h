@@ -50,6 +50,10 @@ struct SyntheticOptions {
 
   double hills_m = 0;  ///< its streets go up and down so far [m]: hills every 150 and 115 m
 
+  // The room.
+  double bare_fraction = 0;  ///< of each wall, a stretch that a plain curtain covers [0..1]
+  int plain_doors = 0;       ///< doors of plain paint beside the way, some 0.3 m from it at the nearest
+
   // The corridor: a ring, twice as long as wide.
   double corridor_m = 40;  ///< its longer side [m]
 

@@ -39,6 +39,10 @@ std::string SyntheticOptions::Validate() const {
   if (!(sign_fraction >= 0 && sign_fraction <= 1)) return "sign_fraction must be 0 to 1";
   if (facades < 5 || facades > 1000) return "facades must be 5 to 1000";
   if (road_surfaces < 1 || road_surfaces > 1000) return "road_surfaces must be 1 to 1000";
+  if (!(bare_fraction >= 0 && bare_fraction <= 1)) return "bare_fraction must be 0 to 1";
+  if (plain_doors < 0 || plain_doors > 4) return "plain_doors must be 0 to 4";
+  if ((bare_fraction > 0 || plain_doors > 0) && scene != SyntheticScene::kRoom)
+    return "bare_fraction and plain_doors are the room's alone";
   if (!(corridor_m >= 12 && corridor_m <= 500)) return "corridor_m must be 12 to 500 m";
   if (!(sides_deg > 0 && sides_deg <= 120)) return "sides_deg must be above 0 and at most 120 degrees";
   if (!(pitch_deg >= -45 && pitch_deg <= 45)) return "pitch_deg must be -45 to 45 degrees";

@@ -380,6 +380,23 @@ cv::Mat PlasterTexture(std::uint64_t seed) {
   return image;
 }
 
+cv::Mat CurtainTexture(std::uint64_t seed) {
+  Random random(seed);
+  const double grey = random.In(150, 200);
+  cv::Mat folds = Noise(256, 4, 64, 12, random.Bits()).row(0), image;
+  cv::GaussianBlur(folds, folds, {0, 0}, 6);
+  cv::repeat(folds, 64, 1, image);
+  image.convertTo(image, CV_8U, 1, grey);
+  return image;
+}
+
+cv::Mat PaintTexture(std::uint64_t seed) {
+  Random random(seed);
+  cv::Mat image = Plain(256, 256, random.In(170, 210));
+  AddNoise(image, 128, 2.5, random.Bits());
+  return image;
+}
+
 cv::Mat PanelTexture(std::uint64_t seed, double grey, int marks) {
   Random random(seed);
   cv::Mat image = Plain(256, 256, grey);

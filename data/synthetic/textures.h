@@ -24,6 +24,8 @@ cv::Mat SkyTexture(std::uint64_t seed);      ///< 512x256: faint clouds
 cv::Mat WoodTexture(std::uint64_t seed);     ///< 256x256: planks or boards of furniture
 cv::Mat ShelfTexture(std::uint64_t seed);    ///< 256x256: rows of books
 cv::Mat PlasterTexture(std::uint64_t seed);  ///< 256x256: a painted wall with almost nothing to see
+cv::Mat CurtainTexture(std::uint64_t seed);  ///< 256x64: upright folds, soft and without a mark
+cv::Mat PaintTexture(std::uint64_t seed);    ///< 256x256: painted wood, with almost nothing to see
 /// 256x256: 4x4 panels of a floor or ceiling, with so many stains and scratches
 cv::Mat PanelTexture(std::uint64_t seed, double grey, int marks);
 cv::Mat DoorTexture(std::uint64_t seed);       ///< 128x256

@@ -7,6 +7,7 @@
 #include "tutti/core/pose.h"
 #include "tutti/frontend/map.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 /// The newest `count` frames have drifted, evenly: by Exp(drift) until the frame that comes next, which has
@@ -25,3 +26,4 @@ void RescaleFrames(const std::map<int, Similarity>& S_world_keyframe, Map* map);
 void RehangFrames(const std::vector<Pose>& poses, Map* map);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -12,7 +12,7 @@ namespace tutti {
 namespace {
 
 constexpr int kAlignments = 15;
-constexpr int kFewestAligned = 200;   // points that find a surface
+constexpr int kFewestAligned = 200;  // points that find a surface
 constexpr double kSteep = 0.25;      // cosine between ray and normal, below which a surface is too slanted
 constexpr double kOneSurface = 0.1;  // neighbours whose inverse depths differ by more are of two [1/m]
 constexpr double kInSigmas = 9;      // square of the distance from a surface at which Huber's loss begins
@@ -69,9 +69,9 @@ class Surfaces {
 
 }  // namespace
 
-std::optional<DepthRotation> RotationByDepth(const RollingShutter& shutter, const MovingDepth& first,
-                                             const MovingDepth& second, const Pose& T_second_first,
-                                             double inverse_sigma) {
+std::optional<DepthAlignment> AlignDepth(const RollingShutter& shutter, const MovingDepth& first,
+                                         const MovingDepth& second, const Pose& T_second_first,
+                                         const Matrix6d& prior, double inverse_sigma) {
   const Surfaces from(shutter, first), to(shutter, second);
   std::vector<Eigen::Vector3d> points;
   for (int r = 0; r < first.grid.Rows(); ++r) {
@@ -82,8 +82,8 @@ std::optional<DepthRotation> RotationByDepth(const RollingShutter& shutter, cons
   Pose T = T_second_first;
   Matrix6d hessian;
   for (int round = 0; round < kAlignments; ++round) {
-    hessian.setZero();
-    Vector6d gradient = Vector6d::Zero();
+    hessian = prior;
+    Vector6d gradient = prior * LogSE3(T * T_second_first.Inverse());
     int found = 0;
     for (const Eigen::Vector3d& point : points) {
       const Eigen::Vector3d p = T * point;
@@ -107,8 +107,17 @@ std::optional<DepthRotation> RotationByDepth(const RollingShutter& shutter, cons
     T = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * T;
     if (!T.IsFinite()) return std::nullopt;
   }
+  return DepthAlignment{T, hessian};
+}
+
+std::optional<DepthRotation> RotationByDepth(const RollingShutter& shutter, const MovingDepth& first,
+                                             const MovingDepth& second, const Pose& T_second_first,
+                                             double inverse_sigma) {
+  const auto aligned = AlignDepth(shutter, first, second, T_second_first, Matrix6d::Zero(), inverse_sigma);
+  if (!aligned) return std::nullopt;
+  const Matrix6d& hessian = aligned->information;
   DepthRotation out;
-  out.rotation_rad = LogSE3(T).tail<3>();
+  out.rotation_rad = LogSE3(aligned->T_second_first).tail<3>();
   const Eigen::Matrix3d cross = hessian.topRightCorner<3, 3>();
   out.information =
       hessian.bottomRightCorner<3, 3>() -

@@ -6,7 +6,7 @@
 namespace tutti {
 namespace {
 constexpr int kMinDepthFeatures = 50;      // features with depth that a metric map starts from
-constexpr float kBackwardsRadius = 30.0F;  // between neighbouring frames [px]
+constexpr float kBackwardsRadius = 30.0F;  // between neighbouring frames [px]; twice that if it fails
 constexpr std::size_t kMaxWaiting = 100;   // frames kept to be posed backwards
 constexpr int kFramesToRecognise = 3;      // of a session: with so many it starts a piece of its own
 }  // namespace
@@ -25,9 +25,14 @@ void MapInitializer::Reset() {
   hold_ = 0;
 }
 
-void MapInitializer::NextPiece() {
+void MapInitializer::NextPiece(const std::vector<TrackedFrame>& lost) {
   ++piece_;
   Reset();
+  if (rig_.sensor == Sensor::kMono) {
+    mono_.Await(lost);
+  } else {
+    waiting_ = lost;
+  }
 }
 
 MapInitializer::Start MapInitializer::Offer(const TrackedFrame& frame, const LastFrame& last,
@@ -91,9 +96,16 @@ std::vector<std::pair<TrackedFrame, Pose>> MapInitializer::PoseBackwards(
     Pose T = first ? T0 : neighbour;
     if (!first && between) T = ExpSE3(motion * ((frame->stamp_s - k0.stamp_s) / span)) * T0;
     if (!first) {
-      FrameMatches matches{frame->features.get(), std::vector<int>(frame->features->size(), -1)};
-      MatchToLastFrame(map, rig_.camera, T, {k0.features.get(), k0.landmarks}, kBackwardsRadius, &matches);
-      if (search_.Refine(map, &matches, &T) < options_.min_inliers) {
+      bool found = false;
+      for (const float radius : {kBackwardsRadius, 2 * kBackwardsRadius}) {
+        FrameMatches matches{frame->features.get(), std::vector<int>(frame->features->size(), -1)};
+        Pose guess = T;
+        MatchToLastFrame(map, rig_.camera, T, {k0.features.get(), k0.landmarks}, radius, &matches);
+        found = search_.Refine(map, &matches, &guess) >= options_.min_inliers;
+        if (found) T = guess;
+        if (found) break;
+      }
+      if (!found) {
         if (!between) backwards_alive = false;
         continue;
       }

@@ -33,8 +33,9 @@ class MapInitializer {
   Start Offer(const TrackedFrame& frame, const LastFrame& last, AsyncMapper* mapper);
   /// Forgets the frames that were offered.
   void Reset();
-  /// The same, and what starts next is another piece of the map.
-  void NextPiece();
+  /// The same, and what starts next is another piece of the map. `lost`: frames that were lost before it, to
+  /// be posed backwards once it has started.
+  void NextPiece(const std::vector<TrackedFrame>& lost);
   /// Number of the piece that starts next, or started last.
   int piece() const { return piece_; }
 

@@ -11,18 +11,38 @@ namespace tutti {
 namespace {
 constexpr std::size_t kMaxPending = 100;  // frames kept to be posed backwards
 constexpr int kMinMatches = 80;
+constexpr std::size_t kMostReferences = 5;
+constexpr double kReferencesApart_s = 0.2;
+constexpr double kLongest_s = 3;  // views that are further apart only get worse
 }  // namespace
 
 void MonoInitializer::Reset() {
-  reference_ = {};
-  centres_.clear();
+  references_.clear();
   pending_.clear();
 }
 
-void MonoInitializer::Restart(const TrackedFrame& frame) {
-  reference_ = frame;
-  centres_.clear();
-  for (const cv::KeyPoint& k : frame.features->keypoints) centres_.push_back(k.pt);
+// Keeps those that still have enough in common with the frame. Matches of the first of them.
+MonoInitializer::Matches MonoInitializer::FollowReferences(const TrackedFrame& frame) {
+  const float radius = static_cast<float>(std::max(100, rig_.camera.width / 10));
+  Matches first;
+  std::vector<FirstView> kept;
+  for (FirstView& reference : references_) {
+    Matches matches = MatchTwoViews(*reference.frame.features, *frame.features, radius, &reference.centres);
+    if (static_cast<int>(matches.size()) < kMinMatches) continue;
+    if (kept.empty()) first = std::move(matches);
+    kept.push_back(std::move(reference));
+  }
+  references_ = std::move(kept);
+  return first;
+}
+
+void MonoInitializer::KeepAsReference(const TrackedFrame& frame) {
+  const bool full = references_.size() >= kMostReferences;
+  if (full ||
+      (!references_.empty() && !(frame.stamp_s - references_.back().frame.stamp_s >= kReferencesApart_s)))
+    return;
+  references_.push_back({frame, {}});
+  for (const cv::KeyPoint& k : frame.features->keypoints) references_.back().centres.push_back(k.pt);
 }
 
 bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
@@ -37,28 +57,25 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
   if (frame.features->size() < static_cast<std::size_t>(kMinMatches)) {
     return wait("initialising: only " + std::to_string(frame.features->size()) + " features in the image");
   }
-  if (!reference_.features) {
-    Restart(frame);
-    return wait("initialising: waiting for a second view");
+  const bool begins = references_.empty();
+  const Matches matches = FollowReferences(frame);
+  if (references_.empty()) {
+    KeepAsReference(frame);
+    return wait(begins ? "initialising: waiting for a second view"
+                       : "initialising: too few matches with the first view; started again");
   }
-  const float radius = static_cast<float>(std::max(100, rig_.camera.width / 10));
-  const auto matches = MatchTwoViews(*reference_.features, *frame.features, radius, &centres_);
-  if (static_cast<int>(matches.size()) < kMinMatches) {
-    Restart(frame);
-    return wait("initialising: only " + std::to_string(matches.size()) +
-                " matches with the first view; started again");
-  }
+  const FirstView reference = references_.front();
   std::vector<cv::Point2f> first, second;
   for (const auto& [a, b] : matches) {
-    first.push_back(reference_.features->keypoints[static_cast<std::size_t>(a)].pt);
+    first.push_back(reference.frame.features->keypoints[static_cast<std::size_t>(a)].pt);
     second.push_back(frame.features->keypoints[static_cast<std::size_t>(b)].pt);
   }
   TwoViewOptions options;
   options.pixel_sigma = options_.pixel_sigma;
   const TwoViewResult view = EstimateTwoView(rig_.camera, first, second, options);
   if (!view.success) {
-    // Views that have drifted far apart only get worse.
-    if (frame.stamp_s - reference_.stamp_s > 3.0) Restart(frame);
+    if (frame.stamp_s - reference.frame.stamp_s > kLongest_s) references_.erase(references_.begin());
+    KeepAsReference(frame);
     return wait("initialising: " + view.reason);
   }
 
@@ -70,6 +87,7 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
     std::snprintf(text, sizeof text,
                   "initialising: the direction of motion is known to %.1f deg only, %.1f deg are needed",
                   sigma_deg, options_.max_direction_sigma_deg);
+    KeepAsReference(frame);
     return wait(text);
   }
   *map = std::move(trial);
@@ -78,8 +96,9 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
 
 // The reference and `frame` as keyframes, with their common landmarks, adjusted.
 void MonoInitializer::AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
-                              double median_depth, const std::vector<std::pair<int, int>>& matches,
-                              const TwoViewResult& view, Map* map) const {
+                              double median_depth, const Matches& matches, const TwoViewResult& view,
+                              Map* map) const {
+  const TrackedFrame& reference = references_.front().frame;
   std::vector<double> depths;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (view.valid[i]) depths.push_back(view.points[i].z());
@@ -89,9 +108,9 @@ void MonoInitializer::AddPair(const TrackedFrame& frame, int piece, const Pose& 
   T_second_first.translation *= scale;
 
   Keyframe k0, k1;
-  k0.frame_index = reference_.index;
-  k0.stamp_s = reference_.stamp_s;
-  k0.features = reference_.features;
+  k0.frame_index = reference.index;
+  k0.stamp_s = reference.stamp_s;
+  k0.features = reference.features;
   k0.T_world_camera = T_world_camera;
   k1.frame_index = frame.index;
   k1.stamp_s = frame.stamp_s;

@@ -28,24 +28,38 @@ class MonoInitializer {
   /// 100.
   const std::vector<TrackedFrame>& pending() const { return pending_; }
   void Reset();
+  /// Further frames to be posed backwards, older than all that are offered from now on.
+  void Await(const std::vector<TrackedFrame>& earlier) { pending_ = earlier; }
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(reference_, centres_, pending_);
+    archive(references_, pending_);
   }
   /// Throws InputError if the state does not fit the map.
   void Check(const Map& map, const internal::SectionReader& file) const;
 
  private:
-  void Restart(const TrackedFrame& frame);
+  // A first view, and where its features are by now.
+  struct FirstView {
+    TrackedFrame frame;
+    std::vector<cv::Point2f> centres;
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(frame, centres);
+    }
+  };
+  using Matches = std::vector<std::pair<int, int>>;
+  Matches FollowReferences(const TrackedFrame& frame);
+  void KeepAsReference(const TrackedFrame& frame);
   void AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera, double median_depth,
-               const std::vector<std::pair<int, int>>& matches, const TwoViewResult& view, Map* map) const;
+               const Matches& matches, const TwoViewResult& view, Map* map) const;
   double DirectionSigmaOfPair(const Map& map) const;
 
   OdometryOptions options_;
   CameraRig rig_;
-  TrackedFrame reference_;
-  std::vector<cv::Point2f> centres_;
+  // Oldest first. The first is the one that frames are compared with; the others take its place when it has
+  // gone out of view.
+  std::vector<FirstView> references_;
   std::vector<TrackedFrame> pending_;
 };
 

@@ -18,6 +18,7 @@ namespace {
 constexpr int kRamp = 40, kShortestRamp = 10;  // keyframes that a drift of the scale is spread over
 constexpr double kKnown = 0.3;                 // share of landmarks by which a place is one seen before
 constexpr int kRicher = 2;                     // times the features, where landmarks get few
+constexpr int kMostFailed = 5;                 // frames in a row, in tracking backwards
 constexpr int kStartRounds = 2;                // of finding how a rolling shutter's first frame moved
 
 }  // namespace
@@ -196,6 +197,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
   tracker_.Begin(frame, keyframe);
   height_.Forget();
   relocalizer_.Found();
+  relocalizer_.TakeLost();
   AddFrame(frame, tracker_.last().T_camera_world, keyframe.id);
   mapper_.Skip(start.keyframe);
   result.state = TrackingState::kTracking;
@@ -215,7 +217,7 @@ TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame, const Tracker::T
   localizer_.Lost();
   if (relocalizer_.Lose(frame) && !localizer_.Begun()) {  // a loop closure may join the two pieces later
     tracker_.GiveUp();
-    initializer_.NextPiece();
+    initializer_.NextPiece(relocalizer_.Lost());
   }
   TrackResult result;
   result.state = TrackingState::kLost;
@@ -245,6 +247,7 @@ void Odometry::Impl::BeginLocalization() {
   initializer_.Reset();
   tracker_.Forget();
   relocalizer_.Found();
+  relocalizer_.TakeLost();
   mapper_.MapOfFrames()->TakeFrames(Map(map().scales()));
   frames_before_session_ = 0;
   result_ = TrackResult();
@@ -311,6 +314,7 @@ std::optional<Matrix6d> Odometry::Impl::PoseCovariance() const {
 
 TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked, bool goes_on) {
   relocalizer_.Found();
+  TrackLost();
   mapper_.CountSeen(*tracked.fix);
   if (tracked.by_grey_before > 0 && tracked.fix->drift)
     SpreadDrift(tracked.by_grey_before, *tracked.fix->drift, tracked.fix->T_camera_world.rotation,
@@ -326,6 +330,25 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked, bool goes_on
   result.T_world_camera = last.T_camera_world.Inverse();
   if (localizer_.Beyond()) relocalizer_.Wait(last.frame);
   return result;
+}
+
+// The frames that were lost before the one that has just been found, backwards from there: a camera that
+// comes back from a bare wall sees more and more of what it found again.
+void Odometry::Impl::TrackLost() {
+  const std::vector<TrackedFrame> lost = relocalizer_.TakeLost();
+  if (localizer_.Begun()) return;
+  Tracker backwards = tracker_;
+  std::vector<LastFrame> found;
+  int failed = 0;  // one after the other
+  for (auto frame = lost.rbegin(); frame != lost.rend() && failed < kMostFailed; ++frame) {
+    if (frame->index == last().frame.index) continue;  // it is the one that was found
+    const bool posed = backwards.Track(*frame, map()).fix.has_value();
+    failed = posed ? 0 : failed + 1;
+    if (posed) found.push_back(backwards.last());
+  }
+  for (auto frame = found.rbegin(); frame != found.rend(); ++frame) {
+    if (IsLater(frame->frame.stamp_s)) AddFrame(frame->frame, frame->T_camera_world, frame->reference, false);
+  }
 }
 
 bool Odometry::Impl::BecomesKeyframe(const Tracker::Tracked& tracked) const {

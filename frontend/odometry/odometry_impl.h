@@ -87,6 +87,7 @@ class Odometry::Impl {
   TrackResult FollowFirst(const TrackedFrame& frame, const Pose& T_odom_camera);
   TrackResult TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked);
   TrackResult Accept(const Tracker::Tracked& tracked, bool goes_on);
+  void TrackLost();
   bool BecomesKeyframe(const Tracker::Tracked& tracked) const;
   int InsertKeyframe();
   void KeepScale();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "frontend/odometry/rolling_search.h"
 #include "frontend/odometry/tracked_frame.h"
@@ -9,8 +10,9 @@
 
 namespace tutti {
 
-/// Keeps the last frame if it has no pose, so that it can be looked for at a keyframe that somebody else has
-/// recognised, and tells when to give the map up. Value type.
+/// Keeps the frames without a pose. The last of them can be searched for at a keyframe that the loop detector
+/// has recognised. Once a later frame has a pose, the others are tracked backwards from there. Tells when to
+/// give the map up. Value type.
 class Relocalizer {
  public:
   Relocalizer(const OdometryOptions& options, const CameraRig& rig)
@@ -19,10 +21,16 @@ class Relocalizer {
   /// The frame has a pose: nothing is lost.
   void Found();
   /// The frame has no pose because there is no map yet.
-  void Wait(const TrackedFrame& frame) { lost_ = frame; }
+  void Wait(const TrackedFrame& frame);
   /// The map has no pose for the frame. True: since longer than OdometryOptions::relocalize_s, frames with
   /// something to see were lost. A covered lens says nothing about the place, and does not start that clock.
   bool Lose(const TrackedFrame& frame);
+
+  /// The frames without a pose since the last one with a pose, oldest first, without their images; of very
+  /// many, the newest.
+  const std::vector<TrackedFrame>& Lost() const { return earlier_; }
+  /// The same; forgets them.
+  std::vector<TrackedFrame> TakeLost();
 
   /// Whether there is a frame to look for.
   bool HasFrame() const { return lost_.has_value(); }
@@ -31,16 +39,19 @@ class Relocalizer {
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(lost_, since_s_);
+    archive(lost_, since_s_, earlier_);
   }
   /// Throws InputError if the state does not fit the map.
   void Check(const Map& map, const internal::SectionReader& file) const;
 
  private:
+  void Keep(const TrackedFrame& frame);
+
   OdometryOptions options_;
   RollingSearch search_;
   std::optional<TrackedFrame> lost_;
-  std::optional<double> since_s_;  // first lost frame with something to see [s]
+  std::vector<TrackedFrame> earlier_;  // without a pose, up to lost_
+  std::optional<double> since_s_;      // first lost frame with something to see [s]
 };
 
 }  // namespace tutti

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "frontend/map/measured.h"
+#include "frontend/odometry/depth_rotation.h"
 
 namespace tutti {
 namespace {
@@ -21,6 +22,9 @@ constexpr double kLongExposure = 0.03;  // of what may be blurred as long as not
 constexpr int kAskAgain = 8;            // frames, after which the exposure may be another
 constexpr double kManyInliers = 3;      // that outweigh grey values, in units of those that a pose needs
 constexpr int kMostByGrey = 300;        // frames in a row that grey values alone pose
+constexpr double kDepthHolds = 0.5;     // a depth image, aligned with the one before by its surfaces [s]
+constexpr int kLeastWithDepth = 50;     // features that make a keyframe where no landmark is found
+constexpr double kLongestByDepth = 2;   // that a camera goes on before a plain surface [s]
 constexpr double kFastestTurn = 10;     // [rad/s]
 constexpr double kFastestMove = 2;      // [1/s], in units of the depth of what is in view
 
@@ -98,7 +102,8 @@ std::optional<PoseFix> RollingSearch::FindExpected(const Map& map, const Tracked
                                                    const LastFrame& last, const Expected& expected,
                                                    bool lost) const {
   std::optional<PoseFix> fix;
-  if (!lost && expected.speed_rad_s * expected.exposure_s > kBlurred)
+  const bool soon = frame.Time() - last.frame.Time() < kMotionHolds;
+  if (!lost && soon && expected.speed_rad_s * expected.exposure_s > kBlurred)
     fix = Blurred(map, frame, last, expected);
   if (fix) return fix;
   if (last.by_grey > 0) fix = Near(map, frame, last, expected);
@@ -183,6 +188,7 @@ std::optional<ExposureEstimate::Misfits> RollingSearch::MisfitsOf(const Map& map
                                                                   const LastFrame& last,
                                                                   const Expected& expected) const {
   const bool ask = last.exposure.IsOpen() || frame.index % kAskAgain == 0;
+  if (!(frame.Time() - last.frame.Time() < kMotionHolds)) return std::nullopt;
   if (!ask || !(expected.speed_rad_s * kLongExposure > kBlurred)) return std::nullopt;
   const std::optional<CameraMotion> aligned = Aligned(map, frame, last, expected);
   if (!aligned) return std::nullopt;
@@ -194,7 +200,8 @@ std::optional<ExposureEstimate::Misfits> RollingSearch::MisfitsOf(const Map& map
 std::optional<CameraMotion> RollingSearch::Aligned(const Map& map, const TrackedFrame& frame,
                                                    const LastFrame& last, const Expected& expected) const {
   const double dt = frame.Time() - last.frame.Time();
-  if (!(dt > 0 && dt < kMotionHolds)) return std::nullopt;
+  const bool depth = frame.features->depth_grid && last.frame.features->depth_grid;
+  if (!(dt > 0 && dt < (depth ? kDepthHolds : kMotionHolds))) return std::nullopt;
   MotionPrior prior = expected.prior;
   if (last.step) prior.sigma = SigmaOfChange(dt, expected.depth);
   std::optional<CameraMotion> found = aligner_.Align(ReferenceOf(map, last, frame.Time()), *frame.features,
@@ -206,17 +213,45 @@ std::optional<CameraMotion> RollingSearch::Aligned(const Map& map, const Tracked
   return possible ? found : std::nullopt;
 }
 
+// By the surfaces of this frame and the last; in the directions that they leave open, the camera goes on as
+// it did.
+std::optional<CameraMotion> RollingSearch::ByDepth(const TrackedFrame& frame, const LastFrame& last,
+                                                   const Expected& expected) const {
+  const double dt = frame.Time() - last.frame.Time();
+  const auto &before = last.frame.features->depth_grid, &now = frame.features->depth_grid;
+  if (!(dt > 0 && dt < kDepthHolds) || !before || !now || !last.mean_velocity) return std::nullopt;
+  const Vector6d sigma = dt * Sigma(dt, expected.depth);
+  const auto aligned = AlignDepth(
+      shutter_, {*before, last.motion}, {*now, *last.mean_velocity}, ExpSE3(*last.mean_velocity * dt),
+      Matrix6d(sigma.cwiseAbs2().cwiseInverse().asDiagonal()), options_.rgbd_inverse_sigma);
+  if (!aligned) return std::nullopt;
+  CameraMotion found;
+  found.T_camera_world = aligned->T_second_first * last.T_camera_world;
+  found.motion = *last.mean_velocity;
+  return found;
+}
+
 std::optional<PoseFix> RollingSearch::ByGreyValues(const Map& map, const TrackedFrame& frame,
                                                    const LastFrame& last, const Expected& expected) const {
   if (last.by_grey >= kMostByGrey) return std::nullopt;
-  const std::optional<CameraMotion> found = Aligned(map, frame, last, expected);
-  if (!found) return std::nullopt;
+  const double dt = frame.Time() - last.frame.Time();
+  const std::optional<CameraMotion> by_depth = ByDepth(frame, last, expected);
   Expected better = expected;
+  // Grey values are compared near the place where they are expected: far apart in time, that is not the last.
+  if (by_depth && dt >= kMotionHolds) better.camera = *by_depth;
+  std::optional<CameraMotion> found = Aligned(map, frame, last, better);
+  if (!found && (last.by_grey + 1) * dt < kLongestByDepth) found = by_depth;
+  if (!found) return std::nullopt;
   better.camera.T_camera_world = found->T_camera_world;
   if (shutter_.RowsTell()) better.camera.motion = found->motion;
   if (auto fix = Near(map, frame, last, better)) return fix;
   PoseFix fix = FixByGrey(frame, last, better);
-  fix.sharp = last.exposure.IsKnown();
+  // A slow camera's images are sharp whatever the exposure; the view changes while the map stays behind.
+  const auto& depths = frame.features->inverse_depth;
+  const bool new_landmarks =
+      std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0; }) >= kLeastWithDepth;
+  const bool slow = SpeedOf(last.motion, expected.depth) * kLongExposure <= kBlurred;
+  fix.sharp = last.exposure.IsKnown() || (slow && new_landmarks);
   return fix;
 }
 

@@ -38,6 +38,8 @@ class RollingSearch {
                                       const Expected& expected, bool lost) const;
   Expected Expect(const Map& map, const TrackedFrame& frame, const LastFrame& last) const;
   std::shared_ptr<const FrameFeatures> Straight(const TrackedFrame& frame, const Expected& expected) const;
+  std::optional<CameraMotion> ByDepth(const TrackedFrame& frame, const LastFrame& last,
+                                      const Expected& expected) const;
   std::optional<CameraMotion> Aligned(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                       const Expected& expected) const;
   std::optional<PoseFix> Blurred(const Map& map, const TrackedFrame& frame, const LastFrame& last,

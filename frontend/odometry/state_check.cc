@@ -141,11 +141,14 @@ void AsyncMapper::Check(const SectionReader& file) const {
 }
 
 void MonoInitializer::Check(const Map& map, const SectionReader& file) const {
-  if (reference_.features) CheckFeatures(reference_.features, map, file);
-  if (centres_.size() != (reference_.features ? reference_.features->size() : 0))
-    file.Damaged("a first view without its features");
-  for (const cv::Point2f& c : centres_) {
-    if (!(std::abs(c.x) < 1e6F && std::abs(c.y) < 1e6F)) file.Damaged("a pixel that is none");
+  for (const FirstView& reference : references_) {
+    if (!reference.frame.features) file.Damaged("a first view without its features");
+    CheckFeatures(reference.frame.features, map, file);
+    if (reference.centres.size() != reference.frame.features->size())
+      file.Damaged("a first view without its features");
+    for (const cv::Point2f& c : reference.centres) {
+      if (!(std::abs(c.x) < 1e6F && std::abs(c.y) < 1e6F)) file.Damaged("a pixel that is none");
+    }
   }
   internal::CheckFrames(pending_, map, file);
 }
@@ -159,6 +162,7 @@ void MapInitializer::Check(const Map& map, const SectionReader& file) const {
 
 void Relocalizer::Check(const Map& map, const SectionReader& file) const {
   if (lost_) CheckFeatures(lost_->features, map, file);
+  internal::CheckFrames(earlier_, map, file);
 }
 
 void Tracker::Check(const Map& map, const SectionReader& file) const {
@@ -168,6 +172,7 @@ void Tracker::Check(const Map& map, const SectionReader& file) const {
   CheckPose(last_.T_camera_world, file);
   CheckLandmarks(last_.matches.landmarks, map, file);
   if (last_.velocity && !last_.velocity->allFinite()) file.Damaged("a velocity that is none");
+  if (last_.mean_velocity && !last_.mean_velocity->allFinite()) file.Damaged("a velocity that is none");
   const bool has_frame = last_.reference >= 0;
   if (has_frame) CheckFeatures(last_.frame.features, map, file);
   const std::size_t features = has_frame ? last_.frame.features->size() : 0;

@@ -63,10 +63,11 @@ struct LastFrame {
   TrackedFrame frame;
   FrameMatches matches;  ///< of frame.features
   Pose T_camera_world;
-  std::optional<Vector6d> velocity;    ///< of T_camera_world, per second: T_now = Exp(v dt) T_last
-  std::optional<Vector6d> step;        ///< mean motion from the frame before, as the velocity
-  Vector6d motion = Vector6d::Zero();  ///< while it was exposed, by this step and the one before
-  Vector6d change = Vector6d::Zero();  ///< of that motion, per second
+  std::optional<Vector6d> velocity;       ///< of T_camera_world, per second: T_now = Exp(v dt) T_last
+  std::optional<Vector6d> step;           ///< mean motion from the frame before, as the velocity
+  std::optional<Vector6d> mean_velocity;  ///< of the last half second: steps between frames are noisy
+  Vector6d motion = Vector6d::Zero();     ///< while it was exposed, by this step and the one before
+  Vector6d change = Vector6d::Zero();     ///< of that motion, per second
   ExposureEstimate exposure;
   bool steady = false;                     ///< the velocity before led to where the frame was found
   int reference = -1;                      ///< keyframe that shares most landmarks with it; -1: no frame yet
@@ -79,8 +80,8 @@ struct LastFrame {
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(frame, matches.landmarks, T_camera_world, velocity, step, motion, change, exposure, steady,
-            reference, newest_keyframe, frames_since_keyframe, by_grey);
+    archive(frame, matches.landmarks, T_camera_world, velocity, step, mean_velocity, motion, change, exposure,
+            steady, reference, newest_keyframe, frames_since_keyframe, by_grey);
     if (Archive::kReading) matches.features = frame.features.get();
   }
 };

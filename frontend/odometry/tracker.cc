@@ -1,5 +1,6 @@
 #include "frontend/odometry/tracker.h"
 
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -7,6 +8,7 @@
 
 namespace tutti {
 namespace {
+constexpr double kMeanTime = 0.3;    // time constant of the mean velocity [s]
 constexpr double kLongestGap = 1.0;  // two poses that are further apart tell no velocity [s]
 }  // namespace
 
@@ -52,6 +54,11 @@ Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
 void Tracker::Move(const std::optional<Vector6d>& step, double dt) {
   const std::optional<Vector6d> before = last_.step;
   last_.velocity = last_.step = step;
+  if (step && last_.mean_velocity) {
+    *last_.mean_velocity += (1 - std::exp(-dt / kMeanTime)) * (*step - *last_.mean_velocity);
+  } else {
+    last_.mean_velocity = step;
+  }
   last_.motion = step.value_or(Vector6d::Zero());
   last_.change = Vector6d::Zero();
   if (!step || !before) return;
@@ -114,7 +121,7 @@ void Tracker::FollowReference(const Pose& T_world_old, const Similarity& S_world
   Pose T_reference_camera = T_world_old.Inverse() * last_.T_camera_world.Inverse();
   T_reference_camera.translation *= S_world_new.scale;
   last_.T_camera_world = (S_world_new.RigidPart() * T_reference_camera).Inverse();
-  for (std::optional<Vector6d>* motion : {&last_.velocity, &last_.step}) {
+  for (std::optional<Vector6d>* motion : {&last_.velocity, &last_.step, &last_.mean_velocity}) {
     if (*motion) (*motion)->head<3>() *= S_world_new.scale;
   }
   last_.motion.head<3>() *= S_world_new.scale;

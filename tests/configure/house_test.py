@@ -10,8 +10,8 @@ import pathlib
 import re
 import sys
 
-LINES, TESTS = 83950, 47200  # of C++ without tests and bench; of tests
-SMALL, SMALL_FILES = 40, 74  # files of fewer lines, at most
+LINES, TESTS = 85500, 48000  # of C++ without tests and bench; of tests
+SMALL, SMALL_FILES = 40, 70  # files of fewer lines, at most
 METHODS = {  # public ones, at most; constructors, operators and friends apart
     ("frontend/include/tutti/frontend/odometry.h", "Odometry"): 10,
     ("apps/slam/include/tutti/slam/slam_system.h", "SlamSystem"): 14,

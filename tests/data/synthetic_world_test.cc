@@ -313,6 +313,42 @@ TEST(SyntheticWorldTest, KinectNoiseGrowsWithDepthAndLeavesHoles) {
   EXPECT_NEAR(cv::mean(error, noisy > 0)[0], 0.007, 0.006);
 }
 
+TEST(SyntheticWorldTest, ARoomBehindCurtainsHasLittleToSee) {
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
+  const auto edges = [&](double bare) {
+    options.bare_fraction = bare;
+    const SyntheticWorld world(options);
+    double sum = 0;
+    for (std::size_t i = 0; i < world.FramesPerLap(); i += world.FramesPerLap() / 8) {
+      cv::Mat detail;
+      cv::Laplacian(world.Render(i).image, detail, CV_32F);
+      sum += cv::norm(detail, cv::NORM_L1) / static_cast<double>(detail.total());
+    }
+    return sum;
+  };
+  const double furnished = edges(0);
+  EXPECT_LT(edges(0.5), 0.8 * furnished);
+  EXPECT_LT(edges(1), 0.5 * furnished);
+}
+
+TEST(SyntheticWorldTest, APlainDoorFillsTheViewFromNearby) {
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
+  options.plain_doors = 2;
+  options.laps = 1;
+  const SyntheticWorld world(options);
+  double nearest = 100;
+  std::size_t filled = 0;
+  for (std::size_t i = 0; i < world.Size(); ++i) {
+    double least = 0, most = 0;
+    cv::minMaxLoc(world.ExactDepth(i), &least, &most);
+    nearest = std::min(nearest, least);
+    if (most < 2) ++filled;
+  }
+  EXPECT_GT(nearest, 0.15);
+  EXPECT_LT(nearest, 0.45);
+  EXPECT_GE(filled, 5u);
+}
+
 // Every row of a shaken camera with a rolling shutter is that of a still camera at the row's time.
 TEST(SyntheticWorldTest, RowsOfARollingShutterAreSeenFromWhereTheCameraIsThen) {
   SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kRgbd);

@@ -233,6 +233,20 @@ TEST(HardToLose, APlainMovingObjectCoversThirtyPercentOfTheView) {
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
 
+// A door of plain paint fills the view for a second and more. Where it is, its surface tells; along it, the
+// motion goes on.
+TEST(HardToLose, APlainDoorBesideTheWay) {
+  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
+  options.bare_fraction = 0.3;
+  options.plain_doors = 3;
+  options.noise_sigma = 1;
+  options.rate_hz = 10;
+  const Outcome out = Follow(testing::Record(testing::RenderedWorld(options), 60), OneMemberConfig());
+  EXPECT_EQ(out.posed, out.frames);
+  EXPECT_EQ(out.pieces, 1);
+  EXPECT_LT(out.ate_m, 0.2);
+}
+
 // ---------------------------------------------------------------- motion
 
 TEST(HardToLose, TurningOnTheSpot) {

@@ -62,6 +62,28 @@ TEST(LoopSolver, ALoopThatKeepsLessThanHalfOfItsWeightLeaves) {
   EXPECT_TRUE(verdict(-8.7).contradicted);
 }
 
+// The camera seemed to slide by half a metre to keyframe 20. Loops across that step say that it did not.
+TEST(LoopSolver, LoopsThatAgreeOverruleAStepThatIsKnownToBeWeak) {
+  const std::vector<LoopEdge> loops = {EdgeOf(0, 17, 22), EdgeOf(1, 18, 23), EdgeOf(2, 16, 24)};
+  const auto solve = [&](bool weak) {
+    std::vector<MapKeyframe> keyframes;
+    for (int k = 0; k < 40; ++k)
+      keyframes.push_back({k, 0, Pose({1, 0, 0, 0}, {k + (k < 20 ? 0 : 1.5), 0, 0})});
+    KeyframeGraphOptions options;
+    options.sigma_translation_ratio = 0.001;
+    KeyframeGraph graph(options);
+    for (int k = 1; k < 40; ++k) graph.NoteMotion(k, weak && k == 20 ? MotionSigma{1.5, 0} : MotionSigma());
+    graph.Update(keyframes);
+    return SolveLoops(graph, {}, loops, SlamOptions());
+  };
+  EXPECT_FALSE(solve(false).moves);
+  const LoopSolution solution = solve(true);
+  ASSERT_TRUE(solution.moves);
+  const auto& poses = solution.correction.S_world_keyframe;
+  EXPECT_NEAR((poses.at(20).translation - poses.at(19).translation).norm(), 1, 0.05);
+  EXPECT_NEAR((poses.at(39).translation - poses.at(20).translation).norm(), 19, 0.01);
+}
+
 TEST(LoopSolver, NothingMovesWhereNoneMayStay) {
   const LoopSolution solution =
       SolveLoops(Line(), {EdgeOf(0, 0, 39)}, {EdgeOf(1, 0, 39, -20)}, SlamOptions());

@@ -46,6 +46,38 @@ TEST_F(MonoInitializerTest, WaitsWhileATurnAndASidewaysStepLookTheSame) {
   EXPECT_TRUE(Start(0.14, bold)) << reason_;
 }
 
+// What a frame shows between two columns of the image.
+TrackedFrame Between(const TrackedFrame& frame, float left, float right, const PinholeCamera& camera) {
+  auto part = std::make_shared<FrameFeatures>();
+  for (std::size_t f = 0; f < frame.features->size(); ++f) {
+    const cv::KeyPoint& k = frame.features->keypoints[f];
+    if (k.pt.x < left || k.pt.x >= right) continue;
+    part->keypoints.push_back(k);
+    part->descriptors.push_back(frame.features->descriptors.row(static_cast<int>(f)));
+  }
+  part->inverse_depth.assign(part->size(), 0);
+  part->inverse_depth_sigma.assign(part->size(), 0);
+  part->BuildGrid(camera.width, camera.height);
+  TrackedFrame out = frame;
+  out.features = part;
+  return out;
+}
+
+// The camera turns to the right: what the first view shows is soon out of sight.
+TEST_F(MonoInitializerTest, AYoungerViewTakesThePlaceOfOneThatIsOutOfSight) {
+  MonoInitializer initializer(OdometryOptions(), Rig());
+  Map map(PyramidScales(OdometryOptions()));
+  const float width = static_cast<float>(camera_.width);
+  const auto offer = [&](double x, double stamp_s, float left, float right) {
+    const TrackedFrame frame = Between(Frame(Moved(x, 0), stamp_s), left * width, right * width, camera_);
+    return initializer.Offer(frame, 0, Pose(), 1, &map, &reason_);
+  };
+  EXPECT_FALSE(offer(0, 0, 0, 0.5F));
+  EXPECT_FALSE(offer(0.02, 0.3, 0, 1));
+  ASSERT_TRUE(offer(0.6, 0.6, 0.3F, 1)) << reason_;
+  EXPECT_NEAR(map.keyframe(0).stamp_s, 0.3, 1e-9);
+}
+
 TEST_F(MonoInitializerTest, KeepsTheFramesThatWait) {
   MonoInitializer initializer(OdometryOptions(), Rig());
   Map map(PyramidScales(OdometryOptions()));

@@ -344,6 +344,27 @@ TEST(Odometry, RelocalizesTheLostFrameAtAKeyframeThatShowsItsPlace) {
   EXPECT_EQ(FrameTrajectory(odometry.map()).size(), Stereo().frames.size() + 1);
 }
 
+TEST(Odometry, FramesThatWereLostAreTrackedBackwardsOnceTheCameraIsFoundAgain) {
+  OdometryOptions options;
+  options.keyframe_inlier_ratio = 0.95;
+  Odometry odometry(options, Stereo().rig);
+  TrackAll(Stereo(), odometry);
+  constexpr std::size_t kCarried = 4;
+  for (std::size_t i = 0; i < kCarried; ++i) {
+    InputFrame carried = Stereo().frames[kCarried - i];
+    carried.index = static_cast<std::int64_t>(Stereo().frames.size() + i);
+    carried.stamp_s = Stereo().frames.back().stamp_s + 0.1 * static_cast<double>(i + 1);
+    ASSERT_EQ(odometry.Track(carried).state, TrackingState::kLost);
+  }
+  ASSERT_EQ(odometry.RelocalizeAt(odometry.map().KeyframeIds().front()).state, TrackingState::kTracking);
+  const Trajectory all = FrameTrajectory(odometry.map());
+  ASSERT_EQ(all.size(), Stereo().frames.size() + kCarried);
+  for (std::size_t i = 0; i < kCarried; ++i) {
+    const Pose& T = all[Stereo().frames.size() + i].pose;
+    EXPECT_LT((T.translation - Stereo().truth[kCarried - i].pose.translation).norm(), 0.05) << i;
+  }
+}
+
 TEST(Odometry, BlankImagesNeverStartAMap) {
   Odometry odometry(OdometryOptions(), Stereo().rig);
   for (std::size_t i = 0; i < 5; ++i) {

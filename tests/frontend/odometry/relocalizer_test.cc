@@ -57,6 +57,22 @@ TEST_F(RelocalizerTest, TheNewestLostFrameIsTheOneThatIsLookedFor) {
   EXPECT_TRUE(relocalizer_.FindAt(0, map_));
 }
 
+TEST_F(RelocalizerTest, KeepsTheLostFramesInTheirOrderUntilTheyAreTaken) {
+  relocalizer_.Lose(Elsewhere(1));
+  relocalizer_.Lose(Nothing(1.1));
+  relocalizer_.Wait(Elsewhere(1.2));
+  relocalizer_.Found();
+  EXPECT_EQ(relocalizer_.Lost().size(), 3u);
+  const std::vector<TrackedFrame> lost = relocalizer_.TakeLost();
+  ASSERT_EQ(lost.size(), 3u);
+  EXPECT_EQ(lost.front().stamp_s, 1);
+  EXPECT_EQ(lost.back().stamp_s, 1.2);
+  EXPECT_TRUE(relocalizer_.TakeLost().empty());
+  for (int i = 0; i < 300; ++i) relocalizer_.Lose(Nothing(0.1 * i));
+  EXPECT_LE(relocalizer_.Lost().size(), 100u);
+  EXPECT_NEAR(relocalizer_.Lost().back().stamp_s, 29.9, 1e-9);
+}
+
 TEST_F(RelocalizerTest, GivesUpWhenNothingOfTheMapWasInViewForTooLong) {
   EXPECT_FALSE(relocalizer_.Lose(Elsewhere(10)));
   EXPECT_FALSE(relocalizer_.Lose(Elsewhere(10.5)));

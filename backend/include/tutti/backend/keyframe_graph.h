@@ -141,9 +141,10 @@ class KeyframeGraph {
   /// not usable.
   void SetSigmas(double translation_ratio, double rotation_rad);
   /// How uncertain the odometry's motion to this keyframe is, since the one that was noted before it;
-  /// ascending by id. An edge is at least as uncertain as all such motions between its ends. Not part of
-  /// State.
+  /// ascending by id. An edge is at least as uncertain as all such motions between its ends.
   void NoteMotion(int keyframe, const MotionSigma& sigma);
+  /// The newest keyframe whose motion was noted; -1: none.
+  int LastNoted() const { return walked_.empty() ? -1 : walked_.back().first; }
   /// Nothing is known of the odometry's step to this keyframe: edges across it get no weight but what keeps
   /// the graph in one. Not part of State.
   void NoteJump(int keyframe) { jumps_.insert(keyframe); }
@@ -158,7 +159,7 @@ class KeyframeGraph {
   /// All but the options, for saved maps (tutti::slam).
   template <class Archive>
   void State(Archive& archive) {
-    archive(keyframes_, births_, merged_, edges_, kept_, carried_, sessions_);
+    archive(keyframes_, births_, merged_, edges_, kept_, carried_, sessions_, walked_);
   }
 
  private:

@@ -23,7 +23,7 @@ struct DenseArguments {
   ReconstructionRequest request;
 };
 
-void Print(const Reconstruction& made) {
+void PrintReconstruction(const Reconstruction& made) {
   SayWarnings(made.warnings);
   const DenseReport& dense = made.dense;
   std::printf("%zu of %zu frames integrated, %zu skipped; %.0f MB of voxels\n", dense.integrated, made.frames,
@@ -46,7 +46,7 @@ int RunDense(const DenseArguments& arguments) {
     throw InputError(file.string() +
                      ": does not say where its images are, or they came from a camera; give DATASET");
   const Reconstruction made = Reconstruct(map.model, *dataset, request);
-  Print(made);
+  PrintReconstruction(made);
   if (!made.interrupted) return 0;
   internal::Say("interrupted; the files have what was integrated by then");
   return 130;

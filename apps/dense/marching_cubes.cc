@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/numbers.h"
 #include "core/parallel.h"
 
 namespace tutti {
@@ -79,13 +80,13 @@ class BlockSurroundings {
 
   // The number of a voxel, counted over all blocks; x, y, z: 0 to 8. Its block must be there.
   EdgeNumber Number(int x, int y, int z) const {
-    const int block = numbers_[static_cast<std::size_t>((x >> 3) + 2 * (y >> 3) + 4 * (z >> 3))];
+    const int block = numbers_[internal::Index((x >> 3) + 2 * (y >> 3) + 4 * (z >> 3))];
     const int voxel = (x & 7) + kBlockSide * ((y & 7) + kBlockSide * (z & 7));
     return static_cast<EdgeNumber>(block) * kBlockVoxels + static_cast<EdgeNumber>(voxel);
   }
   // The voxel, if enough frames measured it.
   const Voxel* At(int x, int y, int z) const {
-    const int block = numbers_[static_cast<std::size_t>((x >> 3) + 2 * (y >> 3) + 4 * (z >> 3))];
+    const int block = numbers_[internal::Index((x >> 3) + 2 * (y >> 3) + 4 * (z >> 3))];
     if (block < 0) return nullptr;
     const int at = (x & 7) + kBlockSide * ((y & 7) + kBlockSide * (z & 7));
     const Voxel& voxel = blocks_.block(block)[static_cast<std::size_t>(at)];

@@ -20,6 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kMostBaselines = 40;
+
 std::string Metres(double length) {
   char text[40];
   std::snprintf(text, sizeof text, "%.3g m", length);
@@ -175,7 +177,7 @@ void WriteFiles(const DenseMap& map, const ReconstructionRequest& request, Recon
 }  // namespace
 
 EnumWords<DenseFrames> WordsOf(DenseFrames) {
-  return {{"auto", DenseFrames::kAuto}, {"all", DenseFrames::kAll}, {"keyframes", DenseFrames::kKeyframes}};
+  return {{"all", DenseFrames::kAll}, {"keyframes", DenseFrames::kKeyframes}};
 }
 
 void CheckReconstruction(const ReconstructionRequest& request) {
@@ -206,15 +208,17 @@ Reconstruction Reconstruct(const MapModel& model, const Dataset& dataset,
         "the images of a camera come only once and are gone; record them, then run on the recording");
   RequireSameCamera(dataset.Rig().camera, model.camera);
   const std::unique_ptr<DepthSource> source = OpenDepth(dataset, model, request.depth);
-  const bool computed = request.depth || dataset.Rig().sensor != Sensor::kRgbd;
-  const bool keyframes_only = source->KeyframesOnly() || request.frames == DenseFrames::kKeyframes ||
-                              (request.frames == DenseFrames::kAuto && computed);
+  const bool keyframes_only = source->KeyframesOnly() || request.frames == DenseFrames::kKeyframes;
   std::vector<PosedFrame> frames = FramesOf(model, dataset, keyframes_only);
   Reconstruction result;
   if (!keyframes_only && frames.size() < dataset.Size())
     result.warnings.push_back(Count(dataset.Size() - frames.size(), "frame") +
                               " of the data set have no pose and are left out");
   DenseOptions options = request.dense;
+  // The depth of a stereo camera is worth little far away: at 40 baselines a pixel of disparity is a tenth of
+  // it and more.
+  if (!request.depth && dataset.Rig().sensor == Sensor::kStereo && options.max_depth_m <= 0)
+    options.max_depth_m = kMostBaselines * dataset.Rig().baseline_m;
   options.free_space = request.grid || request.octomap || request.esdf;
   if (!request.quiet)
     internal::Say("%zu frames, voxels of %s, at most %d MB for them (--memory)", frames.size(),

@@ -16,14 +16,13 @@
 namespace tutti {
 
 /// Which frames with a pose are used.
-enum class DenseFrames { kAuto, kAll, kKeyframes };
-/// auto: all of an RGB-D camera; keyframes where depth has to be computed.
+enum class DenseFrames { kAll, kKeyframes };
 EnumWords<DenseFrames> WordsOf(DenseFrames);
 
 /// What to write where; what is not set is not written.
 struct ReconstructionRequest {
   DenseOptions dense;
-  DenseFrames frames = DenseFrames::kAuto;
+  DenseFrames frames = DenseFrames::kAll;        ///< with `depth` always keyframes
   std::optional<std::filesystem::path> depth;    ///< folder for OpenDepth
   std::optional<std::filesystem::path> cloud;    ///< PLY file
   std::optional<std::filesystem::path> mesh;     ///< PLY file

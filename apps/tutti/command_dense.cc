@@ -23,7 +23,7 @@ struct DenseArguments {
   ReconstructionRequest request;
 };
 
-void Print(const Reconstruction& made) {
+void PrintReconstruction(const Reconstruction& made) {
   SayWarnings(made.warnings);
   const DenseReport& dense = made.dense;
   std::printf("%zu of %zu frames integrated, %zu skipped; %.0f MB of voxels\n", dense.integrated, made.frames,
@@ -46,7 +46,7 @@ int RunDense(const DenseArguments& arguments) {
     throw InputError(file.string() +
                      ": does not say where its images are, or they came from a camera; give DATASET");
   const Reconstruction made = Reconstruct(map.model, *dataset, request);
-  Print(made);
+  PrintReconstruction(made);
   if (!made.interrupted) return 0;
   internal::Say("interrupted; the files have what was integrated by then");
   return 130;
@@ -77,14 +77,16 @@ void SetUpDense(CLI::App& command, int& exit_code) {
       "worth 0.01 to 0.02 in a room, of a stereo camera 0.1 in a street",
       Positive());
   AddWord(command, "--frames", request.frames,
-          "auto: all frames of an RGB-D camera, and keyframes where depth is computed from images (default)",
+          "all that have a pose (default), or keyframes: faster, with fewer views of each surface",
           WordsOf(DenseFrames{}));
   AddDefaulted(
       command, "--min-frames", request.dense.min_frames,
       "a surface is there where so many frames measured it; fewer: more surface and more that is none",
       CLI::Range(1, 1000));
   AddOption(command, "--max-depth", request.dense.max_depth_m,
-            "farther depth is not used [m] (default: all is used)", Positive());
+            "farther depth is not used [m] (default: all is used; of a stereo camera up to 40 "
+            "baselines)",
+            Positive());
   AddPath(command, "--depth", request.depth,
           "for one camera: folder with a depth image for each image of the recording, in the order of their "
           "names, as "

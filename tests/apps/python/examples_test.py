@@ -48,6 +48,16 @@ def test_slam_on_tum(source, tmp_path):
     assert tutti.read_trajectory(tmp_path / "trajectory.txt").shape == (30, 8)
 
 
+def test_dense_map(source, tmp_path):
+    room = tmp_path / "room"
+    subprocess.run([os.environ["TUTTI_EXECUTABLE"], "generate", "--out", room, "--sensor", "rgbd", "--world", "room",
+                    "--width", "160", "--height", "120", "--frames", "10"], check=True, capture_output=True)
+    said = run(source, "dense_map.py", room / "config.yaml", room, room / "groundtruth.txt", tmp_path / "mesh.ply",
+               tmp_path / "grid")
+    assert int(said.split()[0]) > 1000
+    assert (tmp_path / "mesh.ply").exists() and (tmp_path / "grid" / "map.yaml").exists()
+
+
 def test_evaluate_trajectories(source, town, tmp_path):
     truth = tutti.Dataset(town).ground_truth()
     rng = np.random.default_rng(1)

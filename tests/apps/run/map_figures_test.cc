@@ -26,13 +26,17 @@ Odometry Tracked(const testing::Recording& recording, double focal_share) {
 }
 
 // A walk around a room.
-Odometry Tracked(double focal_share) {
-  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
-  options.rate_hz = 8;
-  options.frames = 60;
-  static const testing::Recording room = testing::Record(testing::RenderedWorld(options), 60);
-  return Tracked(room, focal_share);
+const testing::Recording& Walk() {
+  static const testing::Recording room = [] {
+    SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
+    options.rate_hz = 8;
+    options.frames = 60;
+    return testing::Record(testing::RenderedWorld(options), 60);
+  }();
+  return room;
 }
+
+Odometry Tracked(double focal_share) { return Tracked(Walk(), focal_share); }
 
 TEST(MapFigures, OfTheRightCameraFit) {
   const Odometry odometry = Tracked(1);
@@ -45,6 +49,15 @@ TEST(MapFigures, OfTheRightCameraFit) {
   ASSERT_EQ(figures.depth.size(), odometry.map().KeyframeIds().size());
   EXPECT_GT(figures.depth.begin()->second, 0.3);
   EXPECT_LT(figures.depth.begin()->second, 10);
+}
+
+TEST(MapFigures, LocalScaleIsThatOfTheMapAgainstMeasuredDepths) {
+  EXPECT_NEAR(MeasureMap(Tracked(1), {}).local_scale, 1, 0.01);
+  testing::Recording longer = Walk();
+  for (std::size_t i = 25; i < longer.frames.size(); ++i)
+    longer.frames[i].depth_m = 1.2 * longer.frames[i].depth_m;
+  const double scale = MeasureMap(Tracked(longer, 1), {}).local_scale;
+  EXPECT_GT(std::abs(std::log(scale)), 0.05) << scale;
 }
 
 TEST(MapFigures, LookAtTheFramesOfTheSessionAlone) {
@@ -62,6 +75,29 @@ TEST(LensCheck, FindsTheRightCameraRightAndAWrongOneWrong) {
   const LensCheck wrong = CheckLens(Tracked(1.25));
   EXPECT_LT(wrong.focal_ratio, 0.92);
   EXPECT_EQ(CheckLens(Tracked(1.25)).focal_ratio, wrong.focal_ratio);
+}
+
+TEST(LensCheck, SigmaIsThatOfTheScatterOverFirstFrames) {
+  double sum = 0;
+  int runs = 0;
+  for (std::size_t first = 0; first + 36 <= Walk().frames.size(); first += 4, ++runs) {
+    testing::Recording part = Walk();
+    part.frames = {Walk().frames.begin() + static_cast<std::ptrdiff_t>(first),
+                   Walk().frames.begin() + static_cast<std::ptrdiff_t>(first + 36)};
+    const LensCheck check = CheckLens(Tracked(part, 1));
+    ASSERT_TRUE(check.measured) << first;
+    sum += std::pow(std::log(check.focal_ratio) / check.sigma, 2);
+  }
+  EXPECT_GT(sum / runs, 0.2);
+  EXPECT_LT(sum / runs, 3);
+}
+
+// Along a straight road a stereo camera sees the same world with every focal length.
+TEST(LensCheck, OfStereoStraightAheadIsUncertain) {
+  SyntheticOptions options = testing::SmallStereoTown(320, 160);
+  options.block_m = 200;
+  const testing::Recording road = testing::Record(testing::RenderedWorld(options), 45);
+  for (const double share : {1.0, 1.3}) EXPECT_GT(CheckLens(Tracked(road, share)).sigma, 0.05) << share;
 }
 
 // Another lens explains a part of it as well, and would make the focal length uncertain.

@@ -52,12 +52,17 @@ TEST(MapFigures, OfTheRightCameraFit) {
 }
 
 TEST(MapFigures, LocalScaleIsThatOfTheMapAgainstMeasuredDepths) {
-  EXPECT_NEAR(MeasureMap(Tracked(1), {}).local_scale, 1, 0.01);
-  testing::Recording longer = Walk();
-  for (std::size_t i = 25; i < longer.frames.size(); ++i)
-    longer.frames[i].depth_m = 1.2 * longer.frames[i].depth_m;
-  const double scale = MeasureMap(Tracked(longer, 1), {}).local_scale;
-  EXPECT_GT(std::abs(std::log(scale)), 0.05) << scale;
+  Odometry odometry = Tracked(1);
+  EXPECT_NEAR(MeasureMap(odometry, {}).local_scale, 1, 0.01);
+  MapCorrection larger;
+  for (const int id : odometry.map().KeyframeIds()) {
+    Similarity S_world_keyframe(odometry.map().keyframe(id).T_world_camera);
+    S_world_keyframe.translation *= 1.1;
+    S_world_keyframe.scale = 1.1;
+    larger.S_world_keyframe.emplace(id, S_world_keyframe);
+  }
+  odometry.Correct(larger);
+  EXPECT_NEAR(MeasureMap(odometry, {}).local_scale, 1.1, 0.01);
 }
 
 TEST(MapFigures, LookAtTheFramesOfTheSessionAlone) {
@@ -80,16 +85,18 @@ TEST(LensCheck, FindsTheRightCameraRightAndAWrongOneWrong) {
 TEST(LensCheck, SigmaIsThatOfTheScatterOverFirstFrames) {
   double sum = 0;
   int runs = 0;
-  for (std::size_t first = 0; first + 36 <= Walk().frames.size(); first += 4, ++runs) {
+  for (std::size_t first = 0; first + 36 <= Walk().frames.size(); first += 4) {
     testing::Recording part = Walk();
     part.frames = {Walk().frames.begin() + static_cast<std::ptrdiff_t>(first),
                    Walk().frames.begin() + static_cast<std::ptrdiff_t>(first + 36)};
     const LensCheck check = CheckLens(Tracked(part, 1));
-    ASSERT_TRUE(check.measured) << first;
+    if (!check.measured) continue;  // too few keyframes
+    EXPECT_LT(check.sigma, 0.012) << first;
     sum += std::pow(std::log(check.focal_ratio) / check.sigma, 2);
+    ++runs;
   }
-  EXPECT_GT(sum / runs, 0.2);
-  EXPECT_LT(sum / runs, 3);
+  EXPECT_GE(runs, 3);
+  EXPECT_LT(sum / runs, 2);
 }
 
 // Along a straight road a stereo camera sees the same world with every focal length.

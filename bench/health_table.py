@@ -29,7 +29,7 @@ FLAGGED_FAILED, FLAGGED_GOOD, FLAGGED_TWICE = 97, 3, 70  # %, at least, at most,
 LEAST = 100  # good runs, failed ones, and ones with twice the error
 JUDGED = 7  # the draw; its rows are known by now: after a change of limits, judge on a higher one
 REFUSED = "refused"
-BATCH = 12  # runs between two looks at whether there are enough
+BATCH = 24  # runs between two looks at whether there are enough
 MAKING = threading.Lock()  # of worlds
 DAMAGES_A_CUT = 2
 SLOW, LONGER = 0.2, 3  # share of the cuts that lose frames at regular intervals, and how much longer they are
@@ -216,8 +216,8 @@ def measure(a, folder, row):
                           "sim3" if sensor == "mono" else "se3")
     path = errors and errors["path_length_m"]
     shutil.rmtree(folder)
-    return {**row, "path_m": path and round(path, 3), "ate_m": path and round(errors["ate"]["rmse"], 5), "ate_percent": round(100 * errors["ate"]["rmse"] / path, 3) if path else None,
-            "first": first, "turned_deg": turned_deg(frames), "lens_check": summary.get("lens_check"),
+    ate = errors["ate"]["rmse"] if path else None
+    return {**row, "path_m": path and round(path, 3), "ate_m": path and round(ate, 5), "ate_percent": path and round(100 * ate / path, 3), "first": first, "turned_deg": turned_deg(frames), "lens_check": summary.get("lens_check"),
             "posed": round(summary["frames"]["tracked"] / summary["frames"]["total"], 4),
             "word": summary["health"]["word"], "signs": {k: round(v, 4) for k, v in summary["health"]["signs"].items()}}
 
@@ -322,7 +322,7 @@ def main():
     sources = [s for s in SOURCES if SOURCES[s][0] not in REAL or (a.data / SOURCES[s][0]).exists()]
     kept = a.out / f"draw-{a.draw}.json"
     before = [f for f in [kept, *([table.RESULTS / "health.json"] if a.draw == JUDGED else [])] if f.exists()]
-    rows = json.loads(before[0].read_text()) if a.reuse and before else []
+    rows = [r for r in json.loads(before[0].read_text()) if "cut" in r] if a.reuse and before else []  # not those of draws before 6
     with concurrent.futures.ThreadPoolExecutor(a.jobs) as pool:
         drawn = itertools.islice(draw_runs(a.draw, sources), len(rows), a.runs)
         numbered = enumerate(drawn, len(rows))

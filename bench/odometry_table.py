@@ -7,8 +7,9 @@ usage: ./dev bench odometry [ROW...] [--write]
 second one, from six first frames; with loops. `shake`: RGB-D rooms with the noise of a Kinect, 30 Hz, turns of up to 200 deg/s, five
 rooms; with loops. `road`: drives of 400 m and more from three first frames (the street with two lenses: two worlds, five first frames);
 without loops. `slow`: kitti_00_head with every first to fourth frame, and with 10 % of the frames missing at random (five draws);
-600 frames from each of three places, three first frames each; without loops. ATE after Sim(3) alignment, with RGB-D SE(3); posed are the frames of the largest submap; a step is the motion between two
-frames, compared with the true one. What is absent (redkitchen, ffmpeg) is left out.
+600 frames from each of three places, three first frames each; without loops. ATE after Sim(3) alignment, with RGB-D SE(3); posed are the
+frames of the largest submap; a step is the motion between two frames, compared with the true one. What is absent (kitti_00_head,
+redkitchen, ffmpeg) is left out.
 """
 import random
 import shutil
@@ -124,7 +125,8 @@ def slow(a):
 
     def measure(case, start, draw, numbers):
         folder = a.out / f"slow-{case.replace(' ', '-').replace('%', 'percent')}-{start}-{draw}"
-        summary = table.run(a, folder / "run", table.ROOT / "data/configs/kitti_00-02_mono.yaml", cut(data, folder / "cut", numbers), "--no-map", "--no-loops")
+        config, frames = table.ROOT / "data/configs/kitti_00-02_mono.yaml", cut(data, folder / "cut", numbers)
+        summary = table.run(a, folder / "run", config, frames, "--no-map", "--no-loops")
         found.setdefault(case, []).append(dict(figures(summary, "odometry"), start=start, draw=draw))
 
     for stride in SLOW_STRIDES:
@@ -157,14 +159,16 @@ ROWS = {"hand": ("One camera in a hand", hand, "ATE <= 0.10 m, 98 % of the frame
 def section(name, found):
     title, _, bounds, keeps = ROWS[name]
     lines = [f"## {title}", "", f"Bounds of each run: {bounds}.", "",
-             "| what | path | frames posed, least | ATE, median | worst | over that at 10 Hz: median, worst | error of a step, worst | loops true / false | runs within all bounds |",
+             "| what | path | frames posed, least | ATE, median | worst | over that at 10 Hz: median, worst | error of a step, worst "
+             "| loops true / false | runs within all bounds |",
              "|---|--:|--:|--:|--:|--:|--:|--:|--:|"]
     for case, runs in found.items():
         ates, steps = [r["ate_m"] for r in runs], [r["step_m"] for r in runs if r.get("step_m")]
         times = [r["times"] for r in runs if r.get("times")]
         loops = [f"{sum(r[k] for r in runs)}" for k in ("true", "false") if all(r.get(k) is not None for r in runs)]
         lines.append(f"| {case} | {max(r['path_m'] for r in runs):.0f} m | {100 * min(r['posed'] for r in runs):.1f} % "
-                     f"| {statistics.median(ates):.3f} m | {max(ates):.3f} m | {f'{statistics.median(times):.2f}, {max(times):.2f}' if times else '-'} | {f'{100 * max(steps):.1f} cm' if steps else '-'} "
+                     f"| {statistics.median(ates):.3f} m | {max(ates):.3f} m "
+                     f"| {f'{statistics.median(times):.2f}, {max(times):.2f}' if times else '-'} | {f'{100 * max(steps):.1f} cm' if steps else '-'} "
                      f"| {' / '.join(loops) or '-'} | {sum(map(keeps, runs))} of {len(runs)} |")
     return "\n".join(lines) + "\n"
 

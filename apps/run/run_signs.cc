@@ -18,7 +18,7 @@ using Value = std::optional<double>;
 constexpr int kFewInliers = 30;
 constexpr int kEnoughKeyframes = 6;         // of which a map says something
 constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter the map
-constexpr double kSigmas = 2.5;             // that a focal length may be off
+constexpr double kSigmas = 2;               // that a focal length may be off
 constexpr std::size_t kNeighbours = 7;      // steps on either side of one
 constexpr double kStill = 0.002;            // of the scene's depth: images move by about a pixel
 constexpr double kReferenceOff = 0.02;      // that a ground truth may be off [m]
@@ -249,7 +249,7 @@ const std::vector<SignKind>& SignKinds() {
        "check focal length and baseline or depth scale, and that images and depth are of the same time",
        [](const RunResult& r) { return If(HasMap(r) && !IsMono(r), r.map_figures.depth_misfit); }},
       {"focal_length_off", "share",
-       "how far, at least, the focal length that fits the map best is from the given one (less 2.5 standard "
+       "how far, at least, the focal length that fits the map best is from the given one (less 2 standard "
        "deviations)",
        kAbove, 0.005, kNever, "the map fits another focal length better, at least %s away",
        "check fx and fy; without --config and --camera tutti run measures them, and "

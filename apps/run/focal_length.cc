@@ -3,11 +3,14 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include <Eigen/Sparse>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -29,9 +32,11 @@ constexpr double kLensKept = 0.005;    // the same where the lens is taken to be
 constexpr double kNoLens = 1e-5;       // the same where there is none
 constexpr double kNeedsLens = 4;       // gain of another lens [squares of sigma] below which none is needed
 constexpr double kCentreSigma = 0.01;  // prior of the principal point, as share of the width
-constexpr double kCorrelation = 3.0;   // errors of neighbouring keypoints are not independent
-constexpr double kWorstSigma = 0.10;   // of a focal length that is worth more than a guess
-constexpr double kLeftOver = 0.3;      // of a move: what a map that was tracked with another one keeps of it
+constexpr double kLeftOut = 1.3;  // what is not in a sigma: the scatter over first frames and noise is larger
+constexpr double kRidge = 1e-9;
+constexpr double kCorrelation = 3.0;  // errors of neighbouring keypoints are not independent
+constexpr double kWorstSigma = 0.10;  // of a focal length that is worth more than a guess
+constexpr double kLeftOver = 0.3;     // of a move: what a map that was tracked with another one keeps of it
 constexpr double kAnyMove = 1e9;
 constexpr double kWorstChecked = 0.15;  // of one that can speak against another
 constexpr int kFewestKeyframes = 6;
@@ -105,32 +110,38 @@ struct Fit {
   int residuals = 0;
 };
 
-// Adjusts the scene; `fixed_focal`: all but the focal length.
-Fit Adjust(Scene& scene, bool fixed_focal) {
-  ceres::Problem problem;
+// The errors of a scene, in the order of its observations; the priors of its lens are the last.
+void AddErrors(Scene& scene, ceres::Problem* problem) {
   for (const Measurement& o : scene.observations) {
     double* const camera = scene.cameras[static_cast<std::size_t>(o.keyframe)].data();
     double* const landmark = scene.landmarks[static_cast<std::size_t>(o.landmark)].data();
-    problem.AddResidualBlock(
+    problem->AddResidualBlock(
         new ceres::AutoDiffCostFunction<PixelError, 2, 6, 3, 4>(new PixelError{o.offset}),
         new ceres::HuberLoss(2.0), camera, landmark, scene.lens.data());
     if (o.depth > 0) {
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<DepthError, 1, 6, 3, 4>(
-                                   new DepthError{o.depth, o.depth_sigma, scene.given, scene.stereo}),
-                               new ceres::CauchyLoss(2.0), camera, landmark, scene.lens.data());
+      problem->AddResidualBlock(new ceres::AutoDiffCostFunction<DepthError, 1, 6, 3, 4>(
+                                    new DepthError{o.depth, o.depth_sigma, scene.given, scene.stereo}),
+                                new ceres::CauchyLoss(2.0), camera, landmark, scene.lens.data());
     }
   }
-  problem.AddResidualBlock(
+  problem->AddResidualBlock(
       new ceres::AutoDiffCostFunction<LensPrior, 3, 4>(new LensPrior{scene.width, scene.lens_sigma}), nullptr,
       scene.lens.data());
-  // The first that has seen one of the landmarks: the others are not in the problem.
-  const auto first = static_cast<std::size_t>(scene.observations.front().keyframe);
-  problem.SetParameterBlockConstant(scene.cameras[first].data());
-  if (fixed_focal) problem.SetManifold(scene.lens.data(), new ceres::SubsetManifold(4, {0}));
+}
+
+// The first that has seen one of the landmarks, which stays where it is: the others are not in the problem.
+std::size_t FixedCamera(const Scene& scene) {
+  return static_cast<std::size_t>(scene.observations.front().keyframe);
+}
+
+Fit Adjust(Scene& scene) {
+  ceres::Problem problem;
+  AddErrors(scene, &problem);
+  problem.SetParameterBlockConstant(scene.cameras[FixedCamera(scene)].data());
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
   options.max_num_iterations = 40;
-  options.function_tolerance = 1e-5;
+  options.function_tolerance = 1e-6;
   options.num_threads = 1;  // sums in one order
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -247,19 +258,68 @@ double VarianceOf(const Scene& scene, const Fit& fit) {
   return std::max(1e-4, 2 * fit.cost / std::max(1.0, fit.residuals - free));
 }
 
-// How far the focal length can be from the best one, as share of it.
-double SigmaOf(const Scene& best, const Fit& fit) {
-  constexpr double kStep = 0.03;
-  double rise = 0;
-  for (const double step : {-kStep, kStep}) {
-    Scene moved = best;
-    moved.lens[0] += step;
-    const Fit other = Adjust(moved, true);
-    if (!other.usable) return 1;
-    rise += 0.5 * (other.cost - fit.cost);
+double SumOfSquares(const std::vector<double>& values) {
+  return std::inner_product(values.begin(), values.end(), values.begin(), 0.0);
+}
+
+// How far the focal length of an adjusted scene can be from the true one, as share of it. Around the
+// solution, with Jacobian J and errors e, each weighted by its loss, it is off by the sum over all errors of
+// (J u) e, where J^T J u is 1 for the focal length and 0 for all else. Errors of one landmark are not
+// independent, nor are those of one keyframe, so what varies are sums over each: a sandwich estimate with
+// clusters of two kinds (A. C. Cameron, J. B. Gelbach, D. L. Miller, "Robust Inference with Multiway
+// Clustering", Journal of Business & Economic Statistics 2011). The whole sum is what the solver has left to
+// go.
+double SigmaOf(Scene scene) {
+  ceres::Problem problem;
+  AddErrors(scene, &problem);
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = {scene.lens.data()};
+  const auto add = [&](double* block) {
+    if (problem.HasParameterBlock(block)) options.parameter_blocks.push_back(block);
+  };
+  for (std::size_t k = 0; k < scene.cameras.size(); ++k) {
+    if (k != FixedCamera(scene)) add(scene.cameras[k].data());
   }
-  if (!(rise > 0)) return 1;
-  return kCorrelation * kStep * std::sqrt(VarianceOf(best, fit) / (2 * rise));
+  for (Eigen::Vector3d& landmark : scene.landmarks) add(landmark.data());
+  problem.GetResidualBlocks(&options.residual_blocks);
+  std::vector<double> errors;
+  ceres::CRSMatrix by_all;
+  if (!problem.Evaluate(options, nullptr, &errors, nullptr, &by_all)) return 1;
+  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
+      by_all.num_rows, by_all.num_cols, static_cast<Eigen::Index>(by_all.values.size()), by_all.rows.data(),
+      by_all.cols.data(), by_all.values.data());
+  Eigen::SparseMatrix<double> hessian = J.transpose() * J;
+  hessian.diagonal() *= 1 + kRidge;  // one camera knows no scale
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(hessian);
+  if (solver.info() != Eigen::Success) return 1;
+  const Eigen::VectorXd weights = J * solver.solve(Eigen::VectorXd::Unit(J.cols(), 0)).eval();
+  if (!weights.allFinite()) return 1;
+
+  std::vector<double> of_landmark(scene.landmarks.size(), 0), of_keyframe(scene.cameras.size(), 0), of_each;
+  double left = 0;
+  Eigen::Index row = 0;
+  const auto next = [&] {
+    const double move = weights[row] * errors[static_cast<std::size_t>(row)];
+    ++row;
+    left += move;
+    return move;
+  };
+  for (const Measurement& o : scene.observations) {
+    double move = next();
+    move += next();
+    if (o.depth > 0) move += next();
+    of_landmark[static_cast<std::size_t>(o.landmark)] += move;
+    of_keyframe[static_cast<std::size_t>(o.keyframe)] += move;
+    of_each.push_back(move);
+  }
+  double variance = 0;  // a prior varies as much as it says, wherever the lens has ended up
+  while (row < weights.size()) {
+    variance += weights[row] * weights[row];
+    next();
+  }
+  const double of_landmarks = SumOfSquares(of_landmark);
+  variance += std::max(of_landmarks, of_landmarks + SumOfSquares(of_keyframe) - SumOfSquares(of_each));
+  return std::hypot(kLeftOut * std::sqrt(variance), left);
 }
 
 // What a map says of its camera.
@@ -277,15 +337,16 @@ struct Estimate {
 std::optional<Estimate> EstimateOf(const Scene& scene, double worth_a_sigma) {
   Scene free = scene, straight = scene;
   straight.lens_sigma = kNoLens;
-  const Fit with = Adjust(free, false), without = Adjust(straight, false);
+  const Fit with = Adjust(free), without = Adjust(straight);
   if (!with.usable || !without.usable) return std::nullopt;
   Estimate estimate;
   for (std::size_t i = 0; i < estimate.lens.size(); ++i)
     estimate.lens[i] = 0.5 * (free.lens[i] + straight.lens[i]);
   estimate.lens_sigma = 0.5 * std::abs(free.lens[0] - straight.lens[0]);
   const double moved = estimate.lens[0] - scene.given;
-  if (std::abs(moved) < worth_a_sigma)
-    estimate.sigma = std::hypot(SigmaOf(free, with), estimate.lens_sigma, kLeftOver * moved);
+  if (std::abs(moved) < worth_a_sigma) {
+    estimate.sigma = std::hypot(SigmaOf(free), estimate.lens_sigma, kLeftOver * moved);
+  }
   return estimate;
 }
 
@@ -392,8 +453,8 @@ LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
   // A wrong focal length and a wrong lens look nearly the same, and seldom are both wrong.
   Scene kept = *scene;
   kept.lens_sigma = kLensKept;
-  const Fit by_focal = Adjust(kept, false);
-  Fit fit = Adjust(*scene, false);
+  const Fit by_focal = Adjust(kept);
+  Fit fit = Adjust(*scene);
   if (!fit.usable) return check;
   const double gain = 2 * (by_focal.cost - fit.cost) / VarianceOf(*scene, fit);
   check.other_lens = !by_focal.usable || gain >= kNeedsLens * kCorrelation * kCorrelation;
@@ -401,7 +462,7 @@ LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
     scene = std::move(kept);
     fit = by_focal;
   }
-  check.sigma = SigmaOf(*scene, fit);
+  check.sigma = SigmaOf(*scene);
   check.measured = check.sigma <= kWorstChecked;
   check.focal_ratio = std::exp(scene->lens[0] - scene->given);
   check.k1 = scene->lens[1];

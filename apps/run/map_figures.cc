@@ -11,8 +11,9 @@ namespace tutti {
 namespace {
 
 constexpr double kLeastParallax = 1.0 * internal::kRadians;
-constexpr int kFewestViews = 3;  // else a landmark fits what made it
-constexpr std::size_t kRun = 3;  // keyframes on either side of a jump
+constexpr int kFewestViews = 3;                        // else a landmark fits what made it
+constexpr std::size_t kRun = 3;                        // keyframes on either side of a jump
+constexpr std::size_t kLocal = 5, kFewestDepths = 20;  // keyframes of a local scale, landmarks of each
 
 // A landmark, and from where it was seen first and last.
 struct Sighting {
@@ -47,6 +48,18 @@ double ScaleJump(const std::vector<Step>& steps) {
     if (depth * speed > 0) jump = std::max(jump, std::min(std::abs(depth), std::abs(speed)));
   }
   return std::exp(jump);
+}
+
+// Of keyframes in a row, the farthest from 1.
+double LocalScale(const std::vector<double>& logarithms) {
+  double scale = 0;
+  for (std::size_t end = kLocal; end <= logarithms.size(); ++end) {
+    const auto last = logarithms.begin() + static_cast<std::ptrdiff_t>(end);
+    const double here =
+        internal::Median(std::vector<double>(last - static_cast<std::ptrdiff_t>(kLocal), last));
+    if (std::abs(here) > std::abs(scale)) scale = here;
+  }
+  return std::exp(scale);
 }
 
 }  // namespace
@@ -88,13 +101,13 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
     }
   }
   const PinholeCamera& c = odometry.map().rig().camera;
-  std::vector<double> counts, misfits, depth_misfits;
+  std::vector<double> counts, misfits, depth_misfits, log_scales;
   std::vector<Step> steps;
   int still = 0;
   for (std::size_t k = 0; k < views.size(); ++k) {
     const Pose T_camera_world = views[k].T_world_camera.Inverse();
     const Eigen::Vector3d& centre = views[k].T_world_camera.translation;
-    std::vector<double> depths, angles;
+    std::vector<double> depths, angles, off;
     for (std::size_t f = 0; f < views[k].landmarks.size(); ++f) {
       const auto found = landmarks.find(views[k].landmarks[f]);
       if (found == landmarks.end()) continue;
@@ -106,8 +119,10 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
       angles.push_back(std::max(Angle(ray, landmark.position - landmark.first),
                                 Angle(ray, landmark.position - landmark.last)));
       if (landmark.observations < kFewestViews) continue;
-      if (const double inverse = double(views[k].inverse_depth[f]); inverse > 0)
+      if (const double inverse = double(views[k].inverse_depth[f]); inverse > 0) {
         depth_misfits.push_back(std::abs(p.z() * inverse - 1));
+        off.push_back(std::log(p.z() * inverse));
+      }
       const cv::Point2f pixel = views[k].keypoints[f].pt;
       misfits.push_back(std::hypot(c.fx * p.x() / p.z() + c.cx - double(pixel.x),
                                    c.fy * p.y() / p.z() + c.cy - double(pixel.y)));
@@ -115,6 +130,7 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
     counts.push_back(static_cast<double>(depths.size()));
     if (depths.empty()) continue;
     const double depth = internal::Median(std::move(depths));
+    if (off.size() >= kFewestDepths) log_scales.push_back(internal::Median(std::move(off)));
     figures.depth[views[k].frame_index] = depth;
     still += internal::Median(std::move(angles)) < kLeastParallax ? 1 : 0;
     if (k == 0) continue;
@@ -129,6 +145,7 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
   figures.depth_misfit = internal::Median(std::move(depth_misfits));
   figures.without_parallax = still / static_cast<double>(views.size());
   figures.scale_jump = ScaleJump(steps);
+  figures.local_scale = LocalScale(log_scales);
   return figures;
 }
 

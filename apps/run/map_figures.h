@@ -24,6 +24,8 @@ struct MapFigures {
                                   angle below 1 deg from the others that see them */
   double scale_jump = 1;       /**< from three keyframes to the next three: by what factor depths and speed
                                   changed together, the greatest, either way; 1 with too few keyframes */
+  double local_scale = 1; /**< stereo and depth images: depth of the landmarks over what keyframes measure,
+                             median over five keyframes in a row, the farthest from 1 */
   std::map<std::int64_t, double> depth;  ///< by number of the keyframe's frame: median of its landmarks
 };
 

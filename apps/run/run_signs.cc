@@ -18,7 +18,7 @@ using Value = std::optional<double>;
 constexpr int kFewInliers = 30;
 constexpr int kEnoughKeyframes = 6;         // of which a map says something
 constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter the map
-constexpr double kSigmas = 1.25;            // that a focal length may be off; they are generous
+constexpr double kSigmas = 2;               // that a focal length may be off
 constexpr std::size_t kNeighbours = 7;      // steps on either side of one
 constexpr double kStill = 0.002;            // of the scene's depth: images move by about a pixel
 constexpr double kReferenceOff = 0.02;      // that a ground truth may be off [m]
@@ -219,6 +219,16 @@ const std::vector<SignKind>& SignKinds() {
        kAbove, 2, kNever, "the scale jumps: depths and speed change together by a factor of %s",
        "one camera can't see its scale; a loop, stereo or depth can",
        [](const RunResult& r) { return If(HasMap(r) && IsMono(r), r.map_figures.scale_jump); }},
+      {"local_scale", "factor",
+       "stereo and depth images: depth of the landmarks over what keyframes measure, over five keyframes in "
+       "a "
+       "row, the farthest from 1, either way",
+       kAbove, 1.05, kNever,
+       "the scale is locally off: landmarks and measured depths differ by a factor of %s",
+       "look at the stretch where depth is scarce or wrong; check baseline or depth scale, and focal length",
+       [](const RunResult& r) {
+         return If(HasMap(r) && !IsMono(r), std::exp(std::abs(std::log(r.map_figures.local_scale))));
+       }},
       {"landmarks", "1", "landmarks that a keyframe sees, median", kBelow, 40, 10,
        "the map is thin: a keyframe sees %s landmarks", "bare or dark images; raise odometry.features",
        [](const RunResult& r) { return If(HasMap(r), r.map_figures.landmarks); }},
@@ -239,9 +249,9 @@ const std::vector<SignKind>& SignKinds() {
        "check focal length and baseline or depth scale, and that images and depth are of the same time",
        [](const RunResult& r) { return If(HasMap(r) && !IsMono(r), r.map_figures.depth_misfit); }},
       {"focal_length_off", "share",
-       "how far, at least, the focal length that fits the map best is from the given one (less 1.25 standard "
+       "how far, at least, the focal length that fits the map best is from the given one (less 2 standard "
        "deviations)",
-       kAbove, 0.02, kNever, "the map fits another focal length better, at least %s away",
+       kAbove, 0.005, kNever, "the map fits another focal length better, at least %s away",
        "check fx and fy; without --config and --camera tutti run measures them, and "
        "focal_length.better_camera in summary.json is what the whole map says then",
        FocalLengthOff},

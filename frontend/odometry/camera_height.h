@@ -18,9 +18,10 @@ namespace tutti {
 /// in a hand, on a drone, or before anything but a ground gives no drift.
 class CameraHeight {
  public:
-  /// The next frame, which has its image. `depth`: what is in view, typically [map units].
+  /// The next frame, which has its image. `depth`: what is in view, typically [map units]; `interval_s`:
+  /// since the frame at T_last_world [s].
   void See(const PinholeCamera& camera, const std::shared_ptr<const FrameFeatures>& features,
-           const Pose& T_camera_world, const Pose& T_last_world, double depth);
+           const Pose& T_camera_world, const Pose& T_last_world, double depth, double interval_s);
   /// Nothing that was known holds any more: another piece of the map.
   void Forget();
   /// Logarithm of how much larger the map is here than where the height was first seen; none: not known, or
@@ -50,7 +51,7 @@ class CameraHeight {
   void Update(double misfit, double way);
   double Misfit(double log_height) const { return log_height - reference_ - drift_; }
   void Scale(double scale);
-  void SeeSpeed(double step);
+  void SeeSpeed(double step, double interval_s);
   bool ScaleChanged(double by) const;
   void BeginAnew();
   void Learn(double log_height);
@@ -68,7 +69,7 @@ class CameraHeight {
   int changes_ = 0;                           // times that it was found to rise or sink, at most 8
   int corrections_ = 0;                       // by Correct, ever
   double corrected_ = 0;                      // the logarithm of all of them
-  // Logarithms of the way from frame to frame [map units]: the newest ones, and for long, without the drift.
+  // Logarithms of the speed [map units per second]: the newest ones, and for long, without the drift.
   std::vector<double> speeds_;
   double known_speed_ = 0;
   int failures_ = 0, others_ = 0;  // in a row: without the ground; searches that found another

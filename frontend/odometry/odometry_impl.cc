@@ -57,10 +57,11 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
     return result_;
   }
   const Pose T_last_world = last().T_camera_world;
+  const double last_stamp_s = last().frame.stamp_s;
   const auto [frame, tracked] = Look(input);
   if (tracked.fix && keeps_height_)
     height_.See(rig_.camera, frame.features, last().T_camera_world, T_last_world,
-                map().MedianDepth(last().reference));
+                map().MedianDepth(last().reference), last().frame.stamp_s - last_stamp_s);
   result_ = TrackMap(frame, tracked);
   result_.features = static_cast<int>(frame.features->size());
   return result_;

@@ -26,13 +26,17 @@ Odometry Tracked(const testing::Recording& recording, double focal_share) {
 }
 
 // A walk around a room.
-Odometry Tracked(double focal_share) {
-  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
-  options.rate_hz = 8;
-  options.frames = 60;
-  static const testing::Recording room = testing::Record(testing::RenderedWorld(options), 60);
-  return Tracked(room, focal_share);
+const testing::Recording& Walk() {
+  static const testing::Recording room = [] {
+    SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
+    options.rate_hz = 8;
+    options.frames = 60;
+    return testing::Record(testing::RenderedWorld(options), 60);
+  }();
+  return room;
 }
+
+Odometry Tracked(double focal_share) { return Tracked(Walk(), focal_share); }
 
 TEST(MapFigures, OfTheRightCameraFit) {
   const Odometry odometry = Tracked(1);
@@ -45,6 +49,20 @@ TEST(MapFigures, OfTheRightCameraFit) {
   ASSERT_EQ(figures.depth.size(), odometry.map().KeyframeIds().size());
   EXPECT_GT(figures.depth.begin()->second, 0.3);
   EXPECT_LT(figures.depth.begin()->second, 10);
+}
+
+TEST(MapFigures, LocalScaleIsThatOfTheMapAgainstMeasuredDepths) {
+  Odometry odometry = Tracked(1);
+  EXPECT_NEAR(MeasureMap(odometry, {}).local_scale, 1, 0.01);
+  MapCorrection larger;
+  for (const int id : odometry.map().KeyframeIds()) {
+    Similarity S_world_keyframe(odometry.map().keyframe(id).T_world_camera);
+    S_world_keyframe.translation *= 1.1;
+    S_world_keyframe.scale = 1.1;
+    larger.S_world_keyframe.emplace(id, S_world_keyframe);
+  }
+  odometry.Correct(larger);
+  EXPECT_NEAR(MeasureMap(odometry, {}).local_scale, 1.1, 0.01);
 }
 
 TEST(MapFigures, LookAtTheFramesOfTheSessionAlone) {
@@ -62,6 +80,31 @@ TEST(LensCheck, FindsTheRightCameraRightAndAWrongOneWrong) {
   const LensCheck wrong = CheckLens(Tracked(1.25));
   EXPECT_LT(wrong.focal_ratio, 0.92);
   EXPECT_EQ(CheckLens(Tracked(1.25)).focal_ratio, wrong.focal_ratio);
+}
+
+TEST(LensCheck, SigmaIsThatOfTheScatterOverFirstFrames) {
+  double sum = 0;
+  int runs = 0;
+  for (std::size_t first = 0; first + 36 <= Walk().frames.size(); first += 4) {
+    testing::Recording part = Walk();
+    part.frames = {Walk().frames.begin() + static_cast<std::ptrdiff_t>(first),
+                   Walk().frames.begin() + static_cast<std::ptrdiff_t>(first + 36)};
+    const LensCheck check = CheckLens(Tracked(part, 1));
+    if (!check.measured) continue;  // too few keyframes
+    EXPECT_LT(check.sigma, 0.012) << first;
+    sum += std::pow(std::log(check.focal_ratio) / check.sigma, 2);
+    ++runs;
+  }
+  EXPECT_GE(runs, 3);
+  EXPECT_LT(sum / runs, 2);
+}
+
+// Along a straight road a stereo camera sees the same world with every focal length.
+TEST(LensCheck, OfStereoStraightAheadIsUncertain) {
+  SyntheticOptions options = testing::SmallStereoTown(320, 160);
+  options.block_m = 200;
+  const testing::Recording road = testing::Record(testing::RenderedWorld(options), 45);
+  for (const double share : {1.0, 1.3}) EXPECT_GT(CheckLens(Tracked(road, share)).sigma, 0.05) << share;
 }
 
 // Another lens explains a part of it as well, and would make the focal length uncertain.

@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kDriven = 160;
 constexpr double kDepth = 15;  // [m], about
+constexpr double kInterval_s = 0.1;
 
 const testing::RenderedWorld& LongTown() {
   static const testing::RenderedWorld town([] {
@@ -35,20 +36,39 @@ std::shared_ptr<const FrameFeatures> Features(const cv::Mat& image) {
   return features;
 }
 
+// Between two frames, on a straight road.
+Pose PoseAt(double time) {
+  const auto before = static_cast<std::size_t>(time);
+  Pose pose = PoseOf(before);
+  pose.translation +=
+      (time - static_cast<double>(before)) * (PoseOf(before + 1).translation - pose.translation);
+  return pose;
+}
+
+using OverFrames = std::function<double(std::size_t)>;
+
 // A drive of whose map the scale changes by `rate` a frame; where a drift is told, it is taken out if
-// `corrected`. Returns the logarithm of the scale at its end, over where it was at first.
-double DriveOn(const std::function<double(std::size_t)>& rate, bool corrected, CameraHeight* height) {
+// `corrected`. `time`: of each frame [intervals of the world]. Returns the logarithm of the scale at its end,
+// over where it was at first.
+double DriveOn(
+    const OverFrames& rate, bool corrected, CameraHeight* height,
+    const OverFrames& time = [](std::size_t i) { return static_cast<double>(i); }) {
   double scale = 1;
   Pose T_world_camera = PoseOf(0), last = T_world_camera;
-  for (std::size_t i = 0; i < kDriven; ++i) {
+  for (std::size_t i = 0; time(i) < static_cast<double>(kDriven); ++i) {
+    const double interval = i > 0 ? time(i) - time(i - 1) : 1;
     if (i > 0) {
-      Pose step = PoseOf(i - 1).Inverse() * PoseOf(i);
+      Pose step = PoseAt(time(i - 1)).Inverse() * PoseAt(time(i));
       scale *= std::exp(rate(i));
       step.translation *= scale;
       T_world_camera = last * step;
     }
-    height->See(LongTown().Camera(), Features(LongTown().Render(i).image), T_world_camera.Inverse(),
-                last.Inverse(), kDepth);
+    const bool rendered = time(i) == std::floor(time(i));
+    const auto frame = static_cast<std::size_t>(time(i));
+    const cv::Mat image = rendered ? LongTown().Render(frame).image
+                                   : LongTown().World().RenderFrom(frame, PoseAt(time(i))).image;
+    height->See(LongTown().Camera(), Features(image), T_world_camera.Inverse(), last.Inverse(), kDepth,
+                interval * kInterval_s);
     last = T_world_camera;
     const auto drift = height->Drift();
     if (!corrected || !drift) continue;
@@ -77,7 +97,8 @@ TEST(CameraHeight, TellsNoDriftOverHills) {
   Pose last = hills.World().PoseOf(0);
   for (std::size_t i = 0; i < kDriven; ++i) {
     const Pose now = hills.World().PoseOf(i);
-    height.See(hills.Camera(), Features(hills.Render(i).image), now.Inverse(), last.Inverse(), kDepth);
+    height.See(hills.Camera(), Features(hills.Render(i).image), now.Inverse(), last.Inverse(), kDepth,
+               kInterval_s);
     last = now;
     EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.03) << i;
   }
@@ -117,6 +138,25 @@ TEST(CameraHeight, TakesAScaleThatJumpsForADrift) {
   EXPECT_GT(height.Found()->measurements, 100) << "it did not begin anew";
 }
 
+// The frames come later by as much as the map gets smaller, and so the step of a frame stays what it was.
+TEST(CameraHeight, ComparesSpeedsBySeconds) {
+  CameraHeight height;
+  const auto rate = [](std::size_t i) { return i >= 80 && i < 85 ? std::log(0.8) / 5 : 0; };
+  const auto time = [](std::size_t i) {
+    return i < 80 ? static_cast<double>(i) : 80 + 1.25 * static_cast<double>(i - 80);
+  };
+  EXPECT_LT(std::abs(DriveOn(rate, true, &height, time)), 0.4 * std::abs(std::log(0.8)));
+  EXPECT_GT(height.Found()->measurements, 100) << "it did not begin anew";
+}
+
+// From every fourth frame the ground of the first image is below the second one, or nearly.
+TEST(CameraHeight, IsSilentWhereTheStepIsTooLong) {
+  CameraHeight height;
+  DriveOn([](std::size_t) { return 0.002; }, false, &height,
+          [](std::size_t i) { return 4 * static_cast<double>(i); });
+  EXPECT_FALSE(height.Found()) << height.Found()->measurements;
+}
+
 TEST(CameraHeight, BelievesALoop) {
   CameraHeight height;
   DriveOn(0.0005, false, &height);
@@ -133,7 +173,7 @@ TEST(CameraHeight, SaysNothingBeforeAWallOrSnow) {
     random.fill(snow, cv::RNG::UNIFORM, 0, 255);
     const Pose now(Eigen::Quaterniond::Identity(), {0, 0, 0.8 * i}),
         last(Eigen::Quaterniond::Identity(), {0, 0, 0.8 * std::max(0, i - 1)});
-    height.See(LongTown().Camera(), Features(snow), now.Inverse(), last.Inverse(), kDepth);
+    height.See(LongTown().Camera(), Features(snow), now.Inverse(), last.Inverse(), kDepth, kInterval_s);
   }
   EXPECT_FALSE(height.Drift());
 }
@@ -146,7 +186,7 @@ TEST(CameraHeight, SaysNothingOfACameraThatClimbs) {
     Pose now = PoseOf(i);
     now.translation += 0.02 * static_cast<double>(i) * (now.rotation * Eigen::Vector3d(0, -1, 0));
     height.See(LongTown().Camera(), Features(LongTown().World().RenderFrom(i, now).image), now.Inverse(),
-               last.Inverse(), kDepth);
+               last.Inverse(), kDepth, kInterval_s);
     last = now;
     EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.03) << i;
   }
@@ -163,7 +203,7 @@ TEST(CameraHeight, BeginsAnewWhereTheHeightChanges) {
     const double way = static_cast<double>(i) / kDriven;
     now.translation += 0.7 * way * (now.rotation * Eigen::Vector3d(0, -1, 0));
     height.See(LongTown().Camera(), Features(LongTown().World().RenderFrom(i, now).image), now.Inverse(),
-               last.Inverse(), kDepth);
+               last.Inverse(), kDepth, kInterval_s);
     last = now;
     if (i >= 60) least = std::min(least, height.Found() ? height.Found()->measurements : 0);
     EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.12) << i << ": a third of it";
@@ -173,7 +213,7 @@ TEST(CameraHeight, BeginsAnewWhereTheHeightChanges) {
 
 TEST(CameraHeight, NeedsImages) {
   CameraHeight height;
-  height.See(LongTown().Camera(), std::make_shared<FrameFeatures>(), Pose(), Pose(), kDepth);
+  height.See(LongTown().Camera(), std::make_shared<FrameFeatures>(), Pose(), Pose(), kDepth, kInterval_s);
   EXPECT_FALSE(height.Drift());
 }
 

@@ -5,10 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "apps/dense/fusion.h"
-#include "apps/dense/ground.h"
-#include "apps/dense/marching_cubes.h"
-#include "apps/dense/space.h"
+#include "apps/dense/stages.h"
 #include "apps/dense/voxel_blocks.h"
 #include "tutti/core/error.h"
 

@@ -1,4 +1,4 @@
-#include "apps/dense/ground.h"
+#include "apps/dense/stages.h"
 
 #include <Eigen/LU>
 #include <algorithm>

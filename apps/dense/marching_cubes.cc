@@ -1,4 +1,4 @@
-#include "apps/dense/marching_cubes.h"
+#include "apps/dense/stages.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "apps/dense/space.h"
+#include "apps/dense/stages.h"
 
 #include <algorithm>
 #include <cmath>

@@ -65,7 +65,7 @@ TEST(Start, EveryCommandOfTheHelpExplainsItselfInEitherWay) {
     EXPECT_THAT(help.output, HasSubstr("Usage: tutti " + name)) << name;
     EXPECT_EQ(help.output, RunTutti({"help", name}).output);
   }
-  EXPECT_EQ(count, 17);
+  EXPECT_EQ(count, 18);
 }
 
 TEST(Start, AnUnknownCommandIsRefusedWithTheNearest) {

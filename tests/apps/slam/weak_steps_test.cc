@@ -14,7 +14,7 @@ constexpr int kFramesOfAKeyframe = 10;
 
 // A map without landmarks: `frames` frames at 30 Hz, the step to each of which has this length.
 template <class StepTo>
-Map Walk(int frames, const StepTo& step_to) {
+Map StepsOf(int frames, const StepTo& step_to) {
   Map map(PyramidScales(OdometryOptions()));
   double x = 0;
   int newest = -1;
@@ -35,7 +35,7 @@ Map Walk(int frames, const StepTo& step_to) {
 }
 
 TEST(WeakSteps, ASlideIsFasterThanWhatIsAroundIt) {
-  const auto sigmas = StepSigmas(Walk(100, [](int i) { return i > 52 && i <= 57 ? 0.03 : 0.003; }), -1, 1);
+  const auto sigmas = StepSigmas(StepsOf(100, [](int i) { return i > 52 && i <= 57 ? 0.03 : 0.003; }), -1, 1);
   ASSERT_EQ(sigmas.size(), 9u);
   for (const auto& [keyframe, sigma] : sigmas) {
     EXPECT_NEAR(sigma.translation_m, keyframe == 6 ? 5 * 0.027 : 0, 1e-6) << keyframe;
@@ -44,15 +44,15 @@ TEST(WeakSteps, ASlideIsFasterThanWhatIsAroundIt) {
 
 TEST(WeakSteps, ACameraThatStartsOrStopsDoesNotSlide) {
   for (const auto& [keyframe, sigma] :
-       StepSigmas(Walk(100, [](int i) { return i < 50 ? 0.002 : 0.03; }), -1, 1))
+       StepSigmas(StepsOf(100, [](int i) { return i < 50 ? 0.002 : 0.03; }), -1, 1))
     EXPECT_EQ(sigma.translation_m, 0) << keyframe;
   for (const auto& [keyframe, sigma] :
-       StepSigmas(Walk(100, [](int i) { return i < 50 ? 0.03 : 0.002; }), -1, 1))
+       StepSigmas(StepsOf(100, [](int i) { return i < 50 ? 0.03 : 0.002; }), -1, 1))
     EXPECT_EQ(sigma.translation_m, 0) << keyframe;
 }
 
 TEST(WeakSteps, ThoseThatWereJudgedAreNotJudgedAgain) {
-  const auto sigmas = StepSigmas(Walk(100, [](int) { return 0.01; }), 6, 1);
+  const auto sigmas = StepSigmas(StepsOf(100, [](int) { return 0.01; }), 6, 1);
   ASSERT_EQ(sigmas.size(), 3u);
   EXPECT_EQ(sigmas.front().first, 7);
 }

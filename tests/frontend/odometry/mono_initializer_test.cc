@@ -47,7 +47,7 @@ TEST_F(MonoInitializerTest, WaitsWhileATurnAndASidewaysStepLookTheSame) {
 }
 
 // What a frame shows between two columns of the image.
-TrackedFrame Between(const TrackedFrame& frame, float left, float right, const PinholeCamera& camera) {
+TrackedFrame WithinColumns(const TrackedFrame& frame, float left, float right, const PinholeCamera& camera) {
   auto part = std::make_shared<FrameFeatures>();
   for (std::size_t f = 0; f < frame.features->size(); ++f) {
     const cv::KeyPoint& k = frame.features->keypoints[f];
@@ -69,7 +69,8 @@ TEST_F(MonoInitializerTest, AYoungerViewTakesThePlaceOfOneThatIsOutOfSight) {
   Map map(PyramidScales(OdometryOptions()));
   const float width = static_cast<float>(camera_.width);
   const auto offer = [&](double x, double stamp_s, float left, float right) {
-    const TrackedFrame frame = Between(Frame(Moved(x, 0), stamp_s), left * width, right * width, camera_);
+    const TrackedFrame frame =
+        WithinColumns(Frame(Moved(x, 0), stamp_s), left * width, right * width, camera_);
     return initializer.Offer(frame, 0, Pose(), 1, &map, &reason_);
   };
   EXPECT_FALSE(offer(0, 0, 0, 0.5F));

@@ -134,7 +134,8 @@ void WriteFiles(const DenseMap& map, const ReconstructionRequest& request, Recon
     WritePly(*request.mesh, mesh);
     result->files.push_back({*request.mesh,
                              Count(mesh.triangles.size(), "triangle") + ", " +
-                                 Count(mesh.vertices.points.size(), "vertex") + " with colours and normals",
+                                 std::to_string(mesh.vertices.points.size()) +
+                                 " vertices with colours and normals",
                              "MeshLab, CloudCompare, Blender; Open3D: read_triangle_mesh"});
   }
   if (request.cloud) {

@@ -105,9 +105,10 @@ Value LensOff(const RunResult& r) {
 }
 
 Value LoopsRefused(const RunResult& r) {
-  // What is younger is in the local map, and was never to enter.
+  // What is younger is in the local map, and was never to enter. Without keyframes there is no constraint
+  // (two views of one camera too far apart for a scale), which says nothing of the map.
   const auto recognised = [&](const Loop& loop) {
-    return loop.verified && !loop.injected &&
+    return loop.verified && !loop.injected && loop.edge.candidate >= 0 &&
            loop.query_stamp_s - loop.candidate_stamp_s >= r.config.run.loop_min_age_s;
   };
   const auto all = std::count_if(r.loops.begin(), r.loops.end(), recognised);

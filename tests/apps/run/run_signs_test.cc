@@ -159,6 +159,7 @@ Loop Recognised(double candidate_s, double query_s, bool accepted) {
   loop.candidate_stamp_s = candidate_s;
   loop.query_stamp_s = query_s;
   loop.verified = true;
+  loop.edge.candidate = 3;
   loop.state = accepted ? LoopState::kInMap : LoopState::kRejected;
   return loop;
 }
@@ -171,6 +172,8 @@ TEST(RunSigns, LoopsThatTheMapRefusesCountFromThreeOnAndNeighboursDoNot) {
   for (int i = 0; i < 2; ++i) result.loops.push_back(Recognised(i, 70 + i, false));
   EXPECT_EQ(*Sign(result, "loops_refused"), 0);
   for (int i = 2; i < 6; ++i) result.loops.push_back(Recognised(i, 70 + i, false));
+  result.loops.push_back(Recognised(7, 80, false));
+  result.loops.back().edge.candidate = -1;  // no constraint came of it
   EXPECT_NEAR(*Sign(result, "loops_refused"), 6.0 / 9, 1e-12);
 }
 

@@ -35,9 +35,12 @@ void SubmapJoiner::Join() {
 
 std::vector<MapMerge::Proposal> SubmapJoiner::Search() const {
   const Map& map = odometry_.map();
+  const std::vector<int> keyframes = map.KeyframeIds();
+  const auto elsewhere = [&](int id) { return map.keyframe(id).piece != map.keyframe(keyframes[0]).piece; };
+  if (std::none_of(keyframes.begin(), keyframes.end(), elsewhere)) return {};  // the usual case
   std::vector<View> views;
   std::map<int, std::vector<std::size_t>> of_piece;
-  for (const int id : map.KeyframeIds()) {
+  for (const int id : keyframes) {
     View view{ViewOf(map, id), {}};
     for (int f = 0; f < view.keyframe.descriptors.rows; ++f) {
       if (view.keyframe.points[static_cast<std::size_t>(f)].allFinite())
@@ -47,7 +50,6 @@ std::vector<MapMerge::Proposal> SubmapJoiner::Search() const {
     views.push_back(std::move(view));
   }
   std::vector<MapMerge::Proposal> proposals;
-  if (of_piece.size() < 2) return proposals;
   for (auto piece = std::next(of_piece.begin()); piece != of_piece.end(); ++piece) {
     const std::vector<std::size_t>& ids = piece->second;
     const std::size_t count = std::min<std::size_t>(ids.size(), kQueries);

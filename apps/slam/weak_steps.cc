@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -83,13 +84,14 @@ std::vector<FrameStep> FrameSteps(const Map& map) {
   return steps;
 }
 
-// By how much each step is longer than those around it explain.
-std::vector<double> Slides(const Map& map, const std::vector<FrameStep>& steps) {
+// By how much each step after `since_s` is longer than those around it explain.
+std::vector<double> Slides(const Map& map, const std::vector<FrameStep>& steps, double since_s) {
   std::vector<double> slides(steps.size(), 0);
   std::size_t first = 0, end = 0;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     while (first < i && steps[first].stamp_s < steps[i].stamp_s - kAround_s) ++first;
     while (end < steps.size() && (end <= i || steps[end].stamp_s <= steps[i].stamp_s + kAround_s)) ++end;
+    if (!(steps[i].stamp_s > since_s)) continue;
     std::vector<double> speeds;
     for (std::size_t k = first; k < end; ++k) {
       if (steps[k].piece == steps[i].piece) speeds.push_back(steps[k].Speed());
@@ -97,8 +99,8 @@ std::vector<double> Slides(const Map& map, const std::vector<FrameStep>& steps) 
     if (speeds.size() < kFewestSpeeds) continue;
     const auto quartile = speeds.begin() + static_cast<std::ptrdiff_t>(3 * speeds.size() / 4);
     std::nth_element(speeds.begin(), quartile, speeds.end());
-    const double depth = map.MedianDepth(steps[i].keyframe);
-    if (steps[i].Speed() > kTimesFaster * *quartile && steps[i].way > kLeastSlide * depth)
+    if (steps[i].Speed() > kTimesFaster * *quartile &&
+        steps[i].way > kLeastSlide * map.MedianDepth(steps[i].keyframe))
       slides[i] = steps[i].way - *quartile * steps[i].seconds;
   }
   return slides;
@@ -108,8 +110,7 @@ std::vector<double> Slides(const Map& map, const std::vector<FrameStep>& steps) 
 
 std::vector<std::pair<int, MotionSigma>> StepSigmas(const Map& map, int after, double pixel_sigma) {
   std::vector<std::pair<int, MotionSigma>> sigmas;
-  const std::vector<FrameStep> steps = FrameSteps(map);
-  const std::vector<double> slides = Slides(map, steps);
+  double first_s = std::numeric_limits<double>::infinity();
   std::map<int, int> newest;  // keyframe of each submap
   std::vector<KeyframeStep> held;
   std::vector<double> shares;
@@ -123,9 +124,12 @@ std::vector<std::pair<int, MotionSigma>> StepSigmas(const Map& map, int after, d
     step.sigma = Held(map, map.keyframe(older), keyframe, pixel_sigma)
                      .value_or(MotionSigma{kUnheld * step.depth, kUnheld});
     shares.push_back(step.Share());
+    if (id > after) first_s = std::min(first_s, map.keyframe(older).stamp_s);
     held.push_back(step);
   }
   const double usual = internal::Median(shares);
+  const std::vector<FrameStep> steps = FrameSteps(map);
+  const std::vector<double> slides = Slides(map, steps, first_s);
   for (const KeyframeStep& step : held) {
     if (step.newer <= after) continue;
     const Keyframe& keyframe = map.keyframe(step.newer);

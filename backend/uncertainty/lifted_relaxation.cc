@@ -1,6 +1,5 @@
 #include "backend/uncertainty/lifted_relaxation.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -98,6 +97,7 @@ template <int D>
 void LiftedRelaxation<D>::Precondition(const Preconditioner& form, Points& v) const {
   // A point's columns are one after the other, as the rows of the right-hand sides are.
   static_assert(sizeof(Point) == sizeof(double) * kRank * (D + 1), "points without gaps");
+  static_assert(kRank == (D + 1) + 2, "SolveMany has two right-hand sides more than a block has rows");
   form.SolveMany(v.front().data());
   Project(v);
 }

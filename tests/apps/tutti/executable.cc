@@ -1,5 +1,6 @@
 #include "tests/apps/tutti/executable.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -7,12 +8,45 @@
 
 #include <csignal>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
 #include "tests/support/made_once.h"
+#include "tests/support/served_program.h"
 
 namespace tutti::testing {
+
+namespace {
+
+// The commands of tutti-images, whose libraries take long to load.
+bool ReadsImages(const std::string& command) {
+  static const std::set<std::string> commands = {"run",  "calibrate-check", "compare", "loops", "generate",
+                                                 "map",  "localize",        "export",  "dense", "merge",
+                                                 "close"};
+  return commands.count(command) > 0;
+}
+
+// What is written into a pipe until its last writer has closed it. Sends `signal` (0: none) to `child` as
+// soon as that holds `text`.
+std::string Output(int pipe, pid_t child, const std::string& text, int signal) {
+  std::string output;
+  char buffer[4096];
+  bool sent = signal == 0;
+  for (ssize_t n = 0; (n = read(pipe, buffer, sizeof buffer)) > 0;) {
+    output.append(buffer, static_cast<std::size_t>(n));
+    if (!sent && output.find(text) != std::string::npos) {
+      kill(child, signal);
+      sent = true;
+    }
+  }
+  close(pipe);
+  return output;
+}
+
+int ExitStatus(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
+
+}  // namespace
 
 ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
                                   const std::vector<std::string>& arguments, const std::string& text,
@@ -38,19 +72,10 @@ ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
   }
   close(pipe_ends[1]);
   ProcessResult result;
-  char buffer[4096];
-  bool sent = signal == 0;
-  for (ssize_t n = 0; (n = read(pipe_ends[0], buffer, sizeof buffer)) > 0;) {
-    result.output.append(buffer, static_cast<std::size_t>(n));
-    if (!sent && result.output.find(text) != std::string::npos) {
-      kill(child, signal);
-      sent = true;
-    }
-  }
-  close(pipe_ends[0]);
+  result.output = Output(pipe_ends[0], child, text, signal);
   int status = 0;
   waitpid(child, &status, 0);
-  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.status = ExitStatus(status);
   return result;
 }
 
@@ -61,7 +86,17 @@ ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const
 
 ProcessResult RunTutti(std::vector<std::string> arguments, const std::vector<std::string>& more) {
   arguments.insert(arguments.end(), more.begin(), more.end());
-  return RunTuttiAndSignal(arguments, "", 0);
+  if (arguments.empty() || !ReadsImages(arguments[0]) || !CanBeServed())
+    return RunTuttiAndSignal(arguments, "", 0);
+  int pipe_ends[2];
+  if (pipe2(pipe_ends, O_CLOEXEC) != 0) throw std::runtime_error("pipe failed");
+  arguments.insert(arguments.begin(), TUTTI_EXECUTABLE);
+  const int served = BeginServed(TUTTI_IMAGES_EXECUTABLE, arguments, pipe_ends[1]);
+  close(pipe_ends[1]);
+  ProcessResult result;
+  result.output = Output(pipe_ends[0], 0, "", 0);
+  result.status = ExitStatus(EndServed(served));
+  return result;
 }
 
 std::vector<std::string> RunArguments(const std::filesystem::path& config,

@@ -21,7 +21,8 @@ ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
                                   const std::vector<std::string>& arguments, const std::string& text,
                                   int signal);
 
-/// Runs tutti with these arguments, and `more` at the end, and waits for it.
+/// Runs tutti with these arguments, and `more` at the end, and waits for it. Commands that read images run in
+/// a copy of a process that has loaded their libraries (served_program.h).
 ProcessResult RunTutti(std::vector<std::string> arguments, const std::vector<std::string>& more = {});
 
 /// `tutti run` with these, and `more` at the end.

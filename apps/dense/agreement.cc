@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kColumns = 16, kRows = 12;  // of rays
 constexpr std::size_t kLeastRays = 40;
-constexpr double kReachVoxels = 16;       // to both sides of what was measured
+constexpr double kSearchedVoxels = 16;       // to both sides of what was measured
 constexpr double kStepVoxels = 0.5;       // along a ray
 constexpr double kTolerantVoxels = 2;     // what voxels and noise explain: this,
 constexpr double kTolerantNoise = 0.005;  // and of structured light and time of flight this times z^2 [1/m]
@@ -19,7 +19,7 @@ constexpr double kTolerantNoise = 0.005;  // and of structured light and time of
 // Where a ray meets the surface near z, as depth [m]; NaN: nowhere.
 double MeetsAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& ray, double z, const VoxelBlocks& blocks,
                int min_frames) {
-  const double reach = kReachVoxels * blocks.voxel_m(), step = kStepVoxels * blocks.voxel_m();
+  const double reach = kSearchedVoxels * blocks.voxel_m(), step = kStepVoxels * blocks.voxel_m();
   double before = 0, before_z = 0;  // distance at the step before, where it was known and positive
   for (double at = std::max(step, z - reach); at <= z + reach; at += step) {
     const Eigen::Vector3d voxel = ((eye + at * ray) / blocks.voxel_m()).array().round();

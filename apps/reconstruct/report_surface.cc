@@ -32,7 +32,7 @@ class Clusters {
       const Eigen::Vector3d at = (vertices.points[i] - low).cast<double>() / cell;
       const std::uint64_t key = BlockKey(at.array().floor().matrix().cast<int>());
       const auto [found, is_new] = numbers.emplace(key, static_cast<std::uint32_t>(sums_.size()));
-      if (is_new) sums_.emplace_back();
+      if (is_new) sums_.push_back(Vector7d::Zero());
       cluster_of.push_back(found->second);
       sums_[found->second] += Sum(vertices, i);
     }

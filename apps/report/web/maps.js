@@ -134,6 +134,15 @@ function surfaceOf(run) {
     flatshading: true, lighting: { ambient: 0.85, diffuse: 0.35, specular: 0, fresnel: 0 } };
 }
 
+// From where a surface is looked at: from the side of the cameras that saw it; without one from a corner.
+function towards(surface, path, up) {
+  const corner = [0.7, 0.7, 0.7];
+  if (!surface) return corner;
+  const middle = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
+  const side = AXES.map((a, k) => (k === up ? 0 : middle(path[a].filter(isNumber)) - middle(surface[a]))), length = Math.hypot(...side);
+  return length > 0.1 * Math.hypot(...extents(surface)) ? side.map((v) => v / length) : corner;
+}
+
 async function draw3d(panel) {
   const run = chosen();
   const { up } = planeOf(mainPath());
@@ -154,8 +163,8 @@ async function draw3d(panel) {
   const size = boxOf([...paths().map((line) => line.path), surface ?? landmarks]), longest = Math.max(...size, 1e-9);
   const box = size.map((side) => Math.max(side / longest, 0.05));
   const away = (narrow() ? 1.6 : 1.1) * Math.hypot(...box);
-  const eye = [away * 0.7, away * 0.7, away * 0.7];
-  eye[up] = away * sign;
+  const eye = towards(surface, run.slam, up).map((share) => away * share);
+  eye[up] = away * (surface ? 0.6 : 1) * sign;
   const vector = (v) => ({ x: v[0], y: v[1], z: v[2] });
   const scene = { aspectmode: 'manual', aspectratio: vector(box), camera: { up: vector([0, 1, 2].map((k) => (k === up ? sign : 0))), eye: vector(eye) } };
   for (const a of AXES) {

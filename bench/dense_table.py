@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""Depth L1 of meshes at frames that were held out: tutti's and that of Open3D's ScalableTSDFVolume, same poses and voxels.
+"""How good dense maps are: against geometry that is known, and against Open3D's on frames that were held out.
 
-usage: dense_table.py EXAMPLE_09 CONFIG.yaml DATASET [VOXEL_M]     # a data set of TUM's layout with groundtruth.txt
+usage: ./dev bench dense [ROW...] [--write]
 
-Every tenth frame is left out of the integration; the meshes are compared with its depth image, along its rays. Depth that
-either mesh does not cover is left out for both, and counted. EXAMPLE_09 (2 cm voxels) is build/.../example_09_dense_map.
+`room`, `kinect`, `poses`, `stereo`, `grid`: vertices against the walls of generated worlds of three seeds, with true poses or
+(`poses`) with those of `tutti run`, aligned; the worst seed is in brackets. `cost`: a lap integrated once and five times.
+`open3d`: Depth L1 along the rays of every tenth frame, which was left out, of tutti's mesh over that of Open3D's
+ScalableTSDFVolume, same poses and voxels; depth that either does not cover is left out for both, and counted.
 """
+import json
 import pathlib
+import statistics
 import subprocess
-import sys
 import tempfile
 
 import numpy as np
@@ -16,7 +19,10 @@ import open3d as o3d
 from PIL import Image
 from scipy.spatial import cKDTree
 
+import table
+
 HELD_OUT, UNITS, MOST_M, BAND, STEP = 10, 5000.0, 10.0, 4, 3
+SEEDS = (1, 2, 3)
 
 
 def rows(file):
@@ -94,38 +100,110 @@ def searchable(mesh):
     return cKDTree(vertices), vertices, np.asarray(mesh.vertex_normals)
 
 
-def main(example, config, folder, voxel=0.02):
-    all_frames = list(frames(pathlib.Path(folder)))
+def held_out(a, name, folder, config, voxel=0.02):
+    """The row of a data set in TUM's layout with groundtruth.txt."""
+    all_frames = list(frames(folder))
     held = all_frames[HELD_OUT // 2::HELD_OUT]
     train = [f for i, f in enumerate(all_frames) if i % HELD_OUT != HELD_OUT // 2]
     camera = camera_of(config)
     with tempfile.TemporaryDirectory() as work:
         trajectory, mesh_file = pathlib.Path(work) / "train.txt", pathlib.Path(work) / "mesh.ply"
         trajectory.write_text("".join(" ".join([stamp, *map(repr, pose)]) + "\n" for stamp, _, _, pose in train))
-        said = subprocess.run([example, config, folder, trajectory, mesh_file, pathlib.Path(work) / "grid"], check=True,
-                              capture_output=True, text=True).stdout
-        print(said.splitlines()[-1])
+        subprocess.run([a.build / "apps" / "examples" / "example_09_dense_map", config, folder, trajectory, mesh_file,
+                        pathlib.Path(work) / "grid"], check=True, stdout=subprocess.DEVNULL)
         ours = o3d.io.read_triangle_mesh(str(mesh_file))
-    theirs = open3d_mesh(train, camera, float(voxel))
-    meshes = [searchable(ours), searchable(theirs)]
+    meshes = [searchable(ours), searchable(open3d_mesh(train, camera, voxel))]
     errors, covered, measured = [[], []], [0, 0], 0
     for *_, depth_file, pose in held:
         depth = metres(depth_file)[::STEP, ::STEP]
         depth[depth > MOST_M] = 0
-        (a, z), (b, _) = (seen_from(mesh, depth, pose, camera) for mesh in meshes)
-        both = np.isfinite(a) & np.isfinite(b)
+        (x, z), (y, _) = (seen_from(mesh, depth, pose, camera) for mesh in meshes)
+        both = np.isfinite(x) & np.isfinite(y)
         measured += len(z)
-        for k, mesh in enumerate((a, b)):
+        for k, mesh in enumerate((x, y)):
             covered[k] += np.isfinite(mesh).sum()
             errors[k].append(np.abs(mesh - z)[both])
-    for name, e, c in zip(("tutti", "Open3D"), errors, covered):
-        e = np.concatenate(e)
-        print(f"{name}: Depth L1 {100 * e.mean():.3f} cm, median {100 * np.median(e):.3f} cm; covers {100 * c / measured:.1f} %")
-    ratio = np.concatenate(errors[0]).mean() / np.concatenate(errors[1]).mean()
-    print(f"ratio {ratio:.3f} over {len(held)} frames")
+    means = [100 * np.concatenate(e).mean() for e in errors]
+    return (f"{name}, {len(held)} frames held out, {100 * voxel:.0f} cm", f"Depth L1 {means[0]:.3f} cm, Open3D {means[1]:.3f} cm; covers "
+            f"{100 * covered[0] / measured:.1f} %, Open3D {100 * covered[1] / measured:.1f} %", f"ratio {means[0] / means[1]:.3f} <= 1.05")
+
+
+def measured(a, *options, poses=None):
+    """Figures of bench/dense_rows for each seed."""
+    return [json.loads(subprocess.run([a.build / "bench" / "dense_rows", "--seed", str(seed), *map(str, options), *(poses(seed) if poses else [])],
+                                      check=True, capture_output=True, text=True).stdout) for seed in SEEDS]
+
+
+def both(rows, key, scale, digits, worst=max):
+    values = [scale * row[key] for row in rows]
+    return f"{statistics.median(values):.{digits}f} ({worst(values):.{digits}f})"
+
+
+def surface(rows, voxel):
+    return (f"RMS {both(rows, 'rms_m', 1000, 1)} mm = {both(rows, 'rms_m', 1 / voxel, 2)} voxels, worst vertex {both(rows, 'worst_m', 1 / voxel, 1)} "
+            f"voxels, complete {both(rows, 'completeness', 100, 1, min)} %")
+
+
+KINECT = ("--kinect-noise", "--laps", 1, "--supersample", 1)
+
+
+def odometry_of(a):
+    def poses(seed):
+        world = table.generate(a.tutti, a.out / f"room{seed}", ["--world", "room", "--sensor", "rgbd", "--width", 640, "--height", 480, "--seed", seed, *KINECT])
+        run = a.out / f"run{seed}"
+        table.run(a, run, world / "config.yaml", world)
+        return ["--poses", str(run / "trajectory.txt")]
+    return poses
+
+
+def poses_row(a):
+    true, ours = measured(a, *KINECT), measured(a, *KINECT, poses=odometry_of(a))
+    ratio = statistics.median(x["rms_m"] / y["rms_m"] for x, y in zip(ours, true))
+    return [("room, Kinect noise, 2 cm, poses of `tutti run`", surface(ours, 0.02) + f"; RMS {ratio:.2f} of that with true poses", "<= 1.25 of it")]
+
+
+def grid_row(a):
+    lap = ("--grid", "--laps", 1, "--width", 320, "--height", 240, "--supersample", 1, "--stride", 3)
+    for world in ("room", "corridor"):
+        for sensor in ("rgbd", "stereo"):
+            yield (f"grid, {world}, {sensor}", f"{both(measured(a, '--world', world, '--sensor', sensor, *lap), 'grid_right', 100, 1, min)} % of known cells right", ">= 97 %")
+
+
+def cost_row(a):
+    lap = ("--laps", 1, "--supersample", 1)
+    once, five, space = measured(a, *lap), measured(a, *lap, "--rounds", 5), measured(a, *lap, "--grid")
+    return [("a lap of a room, 640x480, 2 cm", f"{both(once, 'cpu_ms', 1, 1)} CPU-ms a frame, with free space {both(space, 'cpu_ms', 1, 1)}; {both(once, 'memory_mb', 1, 0)} MB, "
+             f"with free space {both(space, 'memory_mb', 1, 0)}, after five laps {both(five, 'memory_mb', 1, 0)}", "<= 30 ms, <= 150 MB")]
+
+
+def town_row(a):
+    rows = measured(a, "--world", "town", "--sensor", "stereo", "--laps", 1, "--voxel", 0.1, "--most", 20, "--within", 0.2, "--max-depth", 20, "--stride", 2, "--supersample", 1)
+    return [("town, stereo, 10 cm, up to 20 m", f"mean {both(rows, 'mean_m', 100, 1)} cm, complete within 20 cm {both(rows, 'completeness', 100, 1, min)} %", "<= 10 cm, >= 80 %")]
+
+
+def open3d_row(a):
+    room = table.generate(a.tutti, a.out / "clean", ["--world", "room", "--sensor", "rgbd", "--laps", 1, "--supersample", 1])
+    yield held_out(a, "generated room without noise", room, room / "config.yaml")
+    if (a.data / "redkitchen").exists():
+        yield held_out(a, "redkitchen", a.data / "redkitchen", table.ROOT / "data" / "configs" / "7scenes.yaml")
+
+
+ROWS = {
+    "room": lambda a: [("room, exact depth, 1 cm", surface(measured(a, "--laps", 1, "--supersample", 1, "--voxel", 0.01, "--stride", 2), 0.01), "<= 0.4 voxel, >= 97 %")],
+    "kinect": lambda a: [("room, Kinect noise, 2 cm", surface(measured(a, *KINECT), 0.02), "<= 10 mm")],
+    "poses": poses_row, "grid": grid_row, "town": town_row, "cost": cost_row, "open3d": open3d_row,
+}
+
+
+def main():
+    parser = table.parser(__doc__, "dense", ROWS)
+    a = table.parse(parser, ROWS)
+    made = table.put_json(a, "dense", {name: list(ROWS[name](a)) for name in a.rows})
+    lines = ["# Dense maps", "", "Median of three worlds, the worst in brackets. `./dev bench dense --write`.", "",
+             "| what | measured | bound |", "|---|---|---|"]
+    lines += [f"| {' | '.join(row)} |" for name in ROWS for row in made.get(name, [])]
+    table.put(a, table.RESULTS / "dense.md", "\n".join(lines))
 
 
 if __name__ == "__main__":
-    if not 4 <= len(sys.argv) <= 5:
-        sys.exit(__doc__)
-    main(*sys.argv[1:])
+    main()

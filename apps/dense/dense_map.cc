@@ -98,6 +98,10 @@ bool DenseMap::Impl::MakeBlocks(const DepthView& view, bool free_space, VoxelBlo
 }
 
 std::string DenseMap::Impl::Integrate(const DepthView& view) {
+  if (double off_m = 0; DisagreesWith(surface, view, options.min_frames, &off_m)) {
+    ++report.apart;
+    report.apart_m = std::max(report.apart_m, off_m);
+  }
   bool whole = MakeBlocks(view, false, &surface);
   Fuse(view, options.threads, &surface);
   if (space) {

@@ -38,6 +38,11 @@ std::vector<std::uint64_t> MissingBlocks(const DepthView& view, bool free_space,
 /// Updates all voxels of existing blocks that the view sees, or sees through.
 void Fuse(const DepthView& view, int threads, VoxelBlocks* blocks);
 
+/// Does what the view measures lie elsewhere than the surface that at least `min_frames` frames have measured
+/// along the same rays, in the median of a sample, by more than voxels and noise explain? `median_m`: how far
+/// off, where it does [m].
+bool DisagreesWith(const VoxelBlocks& blocks, const DepthView& view, int min_frames, double* median_m);
+
 /// The mesh, and the voxel that each vertex belongs to: each lies on an edge from its voxel to the next along
 /// x, y or z. Vertices are in the order of their blocks, then of their voxels.
 struct VoxelMesh {

@@ -22,10 +22,10 @@ class SensorDepth : public DepthSource {
 
   DepthImageRead Read(const PosedFrame& frame) const override {
     const ReadResult read = dataset_.Read(frame.place);
-    if (!read.frame) return {{}, read.error};
+    if (!read.frame) return {{}, read.error, 0};
     if (read.frame->depth_m.empty())
-      return {{}, read.depth_error.empty() ? "it has no depth image" : read.depth_error};
-    return {read.frame->depth_m, {}};
+      return {{}, read.depth_error.empty() ? "it has no depth image" : read.depth_error, 0};
+    return {read.frame->depth_m, {}, read.frame->depth_later_s - dataset_.Rig().depth_delay_s};
   }
 
  private:
@@ -34,37 +34,19 @@ class SensorDepth : public DepthSource {
 
 class StereoDepth : public DepthSource {
  public:
-  explicit StereoDepth(const Dataset& dataset) : dataset_(dataset) {
-    // What is nearer than five baselines is not found: a larger range costs time and is wrong more often.
-    constexpr int kStep = 16;  // of the matcher
-    disparities_ = kStep * std::max(1, static_cast<int>(std::ceil(dataset.Rig().camera.fx / 5 / kStep)));
-  }
+  explicit StereoDepth(const Dataset& dataset) : dataset_(dataset) {}
 
   DepthImageRead Read(const PosedFrame& frame) const override {
     const ReadResult read = dataset_.Read(frame.place);
-    if (!read.frame) return {{}, read.error};
+    if (!read.frame) return {{}, read.error, 0};
     if (read.frame->right.empty())
-      return {{}, read.depth_error.empty() ? "it has no right image" : read.depth_error};
-    constexpr int kWindow = 5, kSmooth = kWindow * kWindow, kMostDifference = 1, kUnique = 10, kSpeck = 100;
-    // Left and right must agree within kMostDifference.
-    const auto matcher = cv::StereoSGBM::create(0, disparities_, kWindow, 8 * kSmooth, 32 * kSmooth,
-                                                kMostDifference, 0, kUnique, kSpeck, 2);
-    cv::Mat sixteenths;
-    matcher->compute(read.frame->image, read.frame->right, sixteenths);
-    const double scale = 16 * dataset_.Rig().camera.fx * dataset_.Rig().baseline_m;
-    cv::Mat depth = cv::Mat::zeros(sixteenths.size(), CV_32FC1);
-    for (int v = 0; v < depth.rows; ++v) {
-      for (int u = 0; u < depth.cols; ++u) {
-        const int disparity = sixteenths.at<std::int16_t>(v, u);
-        if (disparity > 0) depth.at<float>(v, u) = static_cast<float>(scale / disparity);
-      }
-    }
-    return {depth, {}};
+      return {{}, read.depth_error.empty() ? "it has no right image" : read.depth_error, 0};
+    const CameraRig& rig = dataset_.Rig();
+    return {DepthOfPair(read.frame->image, read.frame->right, rig.camera.fx, rig.baseline_m), {}, 0};
   }
 
  private:
   const Dataset& dataset_;
-  int disparities_ = 0;
 };
 
 class DepthFromFiles : public DepthSource {
@@ -94,19 +76,20 @@ class DepthFromFiles : public DepthSource {
   DepthImageRead Read(const PosedFrame& frame) const override {
     const fs::path& file = files_[numbers_[frame.place]];
     const ImageFile read = ReadDepthFile(file);
-    if (!read.error.empty()) return {{}, read.error};
+    if (!read.error.empty()) return {{}, read.error, 0};
     const cv::Size size(model_.camera.width, model_.camera.height);
     if (read.image.size() != size)
       return {{},
               file.string() + ": is " + std::to_string(read.image.cols) + "x" +
                   std::to_string(read.image.rows) + ", the images are " + std::to_string(size.width) + "x" +
-                  std::to_string(size.height)};
+                  std::to_string(size.height),
+              0};
     cv::Mat depth;
     read.image.convertTo(depth, CV_32FC1);
     std::string problem;
     const double scale = ScaleOf(depth, *frame.keyframe, &problem);
-    if (!problem.empty()) return {{}, file.string() + ": " + problem};
-    return {depth * scale, {}};
+    if (!problem.empty()) return {{}, file.string() + ": " + problem, 0};
+    return {depth * scale, {}, 0};
   }
   bool KeyframesOnly() const override { return true; }
 
@@ -148,6 +131,26 @@ class DepthFromFiles : public DepthSource {
 };
 
 }  // namespace
+
+cv::Mat DepthOfPair(const cv::Mat& left, const cv::Mat& right, double fx, double baseline_m) {
+  constexpr int kStep = 16;  // of the matcher's range
+  const int disparities = kStep * std::max(1, static_cast<int>(std::ceil(fx / 5 / kStep)));
+  constexpr int kWindow = 5, kSmooth = kWindow * kWindow, kMostDifference = 1, kUnique = 10, kSpeck = 100;
+  // Left and right must agree within kMostDifference.
+  const auto matcher = cv::StereoSGBM::create(0, disparities, kWindow, 8 * kSmooth, 32 * kSmooth,
+                                              kMostDifference, 0, kUnique, kSpeck, 2);
+  cv::Mat sixteenths;
+  matcher->compute(left, right, sixteenths);
+  const double scale = 16 * fx * baseline_m;
+  cv::Mat depth = cv::Mat::zeros(sixteenths.size(), CV_32FC1);
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u) {
+      const int disparity = sixteenths.at<std::int16_t>(v, u);
+      if (disparity > 0) depth.at<float>(v, u) = static_cast<float>(scale / disparity);
+    }
+  }
+  return depth;
+}
 
 std::unique_ptr<DepthSource> OpenDepth(const Dataset& dataset, const MapModel& model,
                                        const std::optional<fs::path>& folder) {

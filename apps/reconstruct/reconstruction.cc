@@ -7,6 +7,7 @@
 
 #include "apps/reconstruct/depth_source.h"
 #include "apps/reconstruct/navigation_files.h"
+#include "apps/reconstruct/report_surface.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/progress.h"
 #include "core/parallel.h"
@@ -21,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMostBaselines = 40;
+constexpr std::int64_t kSameStretch = 3;  // frames apart that are named together
 
 std::string Metres(double length) {
   char text[40];
@@ -32,19 +34,35 @@ std::string Count(std::size_t number, const std::string& what) {
   return std::to_string(number) + " " + what + (number == 1 ? "" : "s");
 }
 
+// Of the camera at `from`, by where it is at `to`.
+Vector6d Velocity(const StampedPose& from, const StampedPose& to, const Pose& T_body_camera) {
+  constexpr double kMostGap = 0.5;  // [s]
+  const double seconds = to.stamp_s - from.stamp_s;
+  if (seconds == 0 || std::abs(seconds) > kMostGap) return Vector6d::Zero();
+  return LogSE3((from.pose * T_body_camera).Inverse() * to.pose * T_body_camera) / seconds;
+}
+
 // The frames of the data set that have a pose, in their order.
 std::vector<PosedFrame> FramesOf(const MapModel& model, const Dataset& dataset, bool keyframes_only) {
   std::map<double, const ModelKeyframe*> keyframes;  // by time stamp
   for (const ModelKeyframe& keyframe : model.keyframes) keyframes[keyframe.stamp_s] = &keyframe;
   const Pose T_body_camera = dataset.Rig().T_body_camera;
   std::vector<PosedFrame> frames;
-  for (const StampedPose& pose : model.trajectory) {
+  for (std::size_t i = 0; i < model.trajectory.size(); ++i) {
+    const StampedPose& pose = model.trajectory[i];
     const std::optional<std::size_t> place = FindStamp(dataset, pose.stamp_s);
     if (!place) continue;
     const auto keyframe = keyframes.find(pose.stamp_s);
     const bool is_keyframe = keyframe != keyframes.end();
     if (keyframes_only && !is_keyframe) continue;
-    frames.push_back({*place, pose.pose * T_body_camera, is_keyframe ? keyframe->second : nullptr});
+    PosedFrame frame;
+    frame.place = *place;
+    frame.T_world_camera = pose.pose * T_body_camera;
+    if (is_keyframe) frame.keyframe = keyframe->second;
+    if (i > 0) frame.velocity_before = Velocity(pose, model.trajectory[i - 1], T_body_camera);
+    if (i + 1 < model.trajectory.size())
+      frame.velocity_after = Velocity(pose, model.trajectory[i + 1], T_body_camera);
+    frames.push_back(frame);
   }
   if (frames.empty())
     throw InputError(
@@ -75,7 +93,7 @@ class Integration {
               std::vector<PosedFrame> frames)
       : dataset_(dataset),
         source_(source),
-        wants_colour_(request.cloud || request.mesh),
+        wants_colour_(request.cloud || request.mesh || request.report),
         frames_(std::move(frames)),
         progress_("dense", frames_.size(), request.quiet ? nullptr : internal::StandardError()) {}
 
@@ -95,10 +113,29 @@ class Integration {
     result->interrupted = InterruptGuard::Requested();
     result->dense = map->Report();
     result->dense.skipped += unread_;
+    if (!apart_.empty()) result->warnings.push_back(ApartWarning(result->dense.apart_m));
     result->frames = frames_.size();
   }
 
  private:
+  std::string ApartWarning(double most_m) const {
+    constexpr std::size_t kNamed = 5;
+    std::string where;
+    std::size_t ranges = 0;
+    for (std::size_t i = 0; i < apart_.size(); ++ranges) {
+      const std::size_t first = i;
+      for (++i; i < apart_.size() && apart_[i] <= apart_[i - 1] + kSameStretch;) ++i;
+      if (ranges >= kNamed) continue;
+      where += (ranges > 0 ? ", " : "") + std::to_string(apart_[first]);
+      if (i > first + 1) where += " to " + std::to_string(apart_[i - 1]);
+    }
+    if (ranges > kNamed) where += ", and in " + std::to_string(ranges - kNamed) + " more places";
+    return "depth and poses disagree in " + Count(apart_.size(), "frame") + " (" + where +
+           "): their depth lies up to " + Metres(most_m) +
+           " from the surface that frames before had measured. Poses slid there, things moved, or depth and "
+           "image have different clocks (camera.depth_delay_s)";
+  }
+
   ReadFrame Read(const PosedFrame& frame) const {
     ReadFrame read;
     read.depth = source_.Read(frame);
@@ -107,13 +144,15 @@ class Integration {
   }
 
   void Integrate(const PosedFrame& frame, const ReadFrame& read, DenseMap* map) {
+    const std::size_t apart = map->Report().apart;
     std::string problem = read.depth.error;
     if (problem.empty()) problem = read.colour.error;
     if (!problem.empty())
       ++unread_;
     else
-      problem =
-          map->Integrate(read.depth.depth_m, read.colour.image, frame.T_world_camera, dataset_.Rig().camera);
+      problem = map->Integrate(read.depth.depth_m, read.colour.image, frame.PoseLater(read.depth.later_s),
+                               dataset_.Rig().camera);
+    if (map->Report().apart > apart) apart_.push_back(dataset_.Number(frame.place));
     if (!problem.empty())
       progress_.Note("tutti: frame " + std::to_string(dataset_.Number(frame.place)) + ": " + problem,
                      "frames are skipped");
@@ -125,12 +164,23 @@ class Integration {
   const std::vector<PosedFrame> frames_;
   Progress progress_;
   std::size_t unread_ = 0;
+  std::vector<std::int64_t> apart_;  // numbers of frames that DenseReport::apart counts
 };
+
+// A report that can't be written is no reason to leave out what was asked for.
+void ExtendReport(const fs::path& folder, const TriangleMesh& mesh, Reconstruction* result) {
+  try {
+    if (ShowInReport(folder, mesh))
+      result->files.push_back({folder / "report.html", "its tab 3D shows the surface", "a browser"});
+  } catch (const InputError& error) {
+    result->warnings.push_back(std::string("the report does not show the surface: ") + error.what());
+  }
+}
 
 // What is asked for, from what was integrated.
 void WriteFiles(const DenseMap& map, const ReconstructionRequest& request, Reconstruction* result) {
+  const TriangleMesh mesh = request.mesh || request.report ? map.Mesh() : TriangleMesh();
   if (request.mesh) {
-    const TriangleMesh mesh = map.Mesh();
     WritePly(*request.mesh, mesh);
     result->files.push_back({*request.mesh,
                              Count(mesh.triangles.size(), "triangle") + ", " +
@@ -145,6 +195,7 @@ void WriteFiles(const DenseMap& map, const ReconstructionRequest& request, Recon
                              Count(cloud.points.size(), "point") + " with colours and normals",
                              "CloudCompare, MeshLab; Open3D: read_point_cloud"});
   }
+  if (request.report) ExtendReport(*request.report, mesh, result);
   if (!request.grid && !request.octomap && !request.esdf) return;
   const OccupiedSpace space = map.Space();
   if (!space.ground_found)

@@ -29,6 +29,7 @@ struct ReconstructionRequest {
   std::optional<std::filesystem::path> grid;     ///< folder for map.pgm and map.yaml
   std::optional<std::filesystem::path> octomap;  ///< .bt file
   std::optional<std::filesystem::path> esdf;     ///< .vdb file
+  std::optional<std::filesystem::path> report;   ///< folder of a run whose report shows the surface
   double low_m = 0.1;                            ///< grid: lower obstacles are driven over
   double robot_height_m = 1.0;                   ///< grid: what hangs higher is driven under
   bool quiet = false;                            ///< no progress, no notes

@@ -97,6 +97,7 @@ Json ComparisonPage(const std::string& title, const std::vector<ReportTable>& ta
   for (Json& run : runs) {
     if (!shown.emplace(run["dataset"].get<std::string>(), run["variant"].get<std::string>()).second) continue;
     CutGallery(run);
+    run.erase("surface");  // a page of many would be too large
     page["runs"].push_back(std::move(run));
   }
   return page;

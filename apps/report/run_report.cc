@@ -71,6 +71,15 @@ Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
   }
 }
 
+// From trajectory.txt to what is drawn; the rotation as x, y, z, w.
+Json AlignmentJson(const Similarity& alignment) {
+  const Eigen::Quaterniond& q = alignment.rotation;
+  const Eigen::Vector3d& t = alignment.translation;
+  return {{"scale", alignment.scale},
+          {"rotation", {q.x(), q.y(), q.z(), q.w()}},
+          {"translation", {t.x(), t.y(), t.z()}}};
+}
+
 Json PointJson(const Eigen::Vector3d& p) { return {Rounded(p.x(), 4), Rounded(p.y(), 4), Rounded(p.z(), 4)}; }
 
 Json EdgesJson(const std::vector<ShownLoop>& loops, const FramePlaces& places) {
@@ -211,6 +220,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["odometry"] = PathJson(result.trajectory_odometry, align_odometry);
   json["odometry_complete"] = result.odometry_complete;
   json["slam"] = PathJson(result.trajectory, align_slam);
+  json["alignment"] = AlignmentJson(align_slam);
   json["earlier"] = Json::array();
   for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k)
     json["earlier"].push_back(PathJson(result.map->earlier[k], align_slam));

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "apps/reconstruct/reconstruction.h"
+#include "apps/run/outputs.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/options.h"
@@ -35,7 +36,7 @@ void PrintReconstruction(const Reconstruction& made) {
 }
 
 int RunDense(const DenseArguments& arguments) {
-  const ReconstructionRequest& request = arguments.request;
+  ReconstructionRequest request = arguments.request;
   const std::filesystem::path file = MapFile(arguments.map);
   for (const auto& out : {request.mesh, request.cloud, request.octomap, request.esdf})
     KeepInputs({file}, {out.value_or("")});
@@ -45,6 +46,8 @@ int RunDense(const DenseArguments& arguments) {
   if (dataset == nullptr)
     throw InputError(file.string() +
                      ": does not say where its images are, or they came from a camera; give DATASET");
+  // The report of the run that the map lies beside shows it, too.
+  if (file.filename() == kMap) request.report = file.parent_path();
   const Reconstruction made = Reconstruct(map.model, *dataset, request);
   PrintReconstruction(made);
   if (!made.interrupted) return 0;

@@ -60,13 +60,15 @@ void MakeDense(const RunRequest& request, const RunResult& result, const RunConf
   const std::unique_ptr<Dataset> dataset = OpenRecording(map, request.dataset.string());
   ReconstructionRequest dense;
   dense.mesh = fs::path(result.folder) / kMesh;
+  dense.report = result.folder;
   dense.dense.threads = request.threads.value_or(config.run.threads);
   dense.quiet = request.quiet;
   const Reconstruction made = Reconstruct(map.model, *dataset, dense);
   SayWarnings(made.warnings);
   for (const ExportedFile& written : made.files)
-    std::printf("  mesh: %s; tutti dense %s makes grids, clouds and finer ones\n", written.content.c_str(),
-                internal::Printable(result.folder.string()).c_str());
+    std::printf("  %s: %s\n", written.path.filename().c_str(), written.content.c_str());
+  std::printf("  tutti dense %s makes grids, clouds and finer meshes\n",
+              internal::Printable(result.folder.string()).c_str());
 }
 
 int RunAndShow(const RunArguments& arguments, const RunRequest& request, const RunConfig& config) {

@@ -1,6 +1,7 @@
 // The state of a run as the page reads it.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -36,6 +37,17 @@ Json TracksJson(const LiveFrame& frame, double scale) {
     tracks.push_back(std::move(pixels));
   }
   return tracks;
+}
+
+// A surface in base64: x, y, z of each point as floats, then their greys.
+std::string Packed(const LivePoints& points) {
+  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+  const std::size_t places = points.surface.size() * sizeof(Eigen::Vector3f);
+  std::vector<std::uint8_t> bytes(places + points.greys.size());
+  if (bytes.empty()) return {};
+  std::memcpy(bytes.data(), points.surface.data(), places);
+  std::copy(points.greys.begin(), points.greys.end(), bytes.begin() + static_cast<std::ptrdiff_t>(places));
+  return Base64(bytes.data(), bytes.size());
 }
 
 Json FrameJson(const LiveFrame& frame) {
@@ -93,7 +105,7 @@ std::string LiveMessage(const LiveNews& news) {
   for (const LivePoints& points : news.points) {
     Json list = Json::array();
     for (const Eigen::Vector3f& p : points.points) list.push_back(Position(p.cast<double>()));
-    json["points"].push_back({points.keyframe, list});
+    json["points"].push_back({points.keyframe, list, Packed(points)});
   }
   json["spots"] = Json::array();
   for (const LiveSpot& spot : news.spots)

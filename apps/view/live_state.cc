@@ -83,7 +83,8 @@ void LiveState::OnRestart() {
   now_.loops = std::make_shared<const std::vector<LiveLoop>>();
 }
 
-void LiveState::OnStart(const CameraRig&, std::size_t frames) {
+void LiveState::OnStart(const CameraRig& rig, std::size_t frames) {
+  rig_ = rig;
   const double end = internal::SteadySeconds() + options_.idle_s;
   std::unique_lock<std::mutex> lock(mutex_);
   now_.total = frames;
@@ -147,7 +148,7 @@ void LiveState::OnFrame(const InputFrame& frame, const TrackResult& track, const
 void LiveState::SetMap(const RunState& state) {
   const std::vector<int> ids = state.odometry->map().KeyframeIds();
   const std::size_t step = ids.size() / kMostPoints + 1;
-  for (std::size_t k = 0; k < ids.size(); k += step) AddPoints(ids[k], *state.odometry);
+  for (std::size_t k = 0; k < ids.size(); k += step) AddPoints({0, ids[k], {}, {}, {}}, *state.odometry);
   joined_ = InEarlierMap(state);  // of a run that was resumed
   const std::lock_guard<std::mutex> lock(mutex_);
   now_.sessions = state.sessions.size();
@@ -186,15 +187,16 @@ void LiveState::AddSpot(const LiveFrame& frame, const RunState& state) {
   if (spots_.size() > kMostSpots) spots_.pop_front();
 }
 
-void LiveState::OnKeyframe(const InputFrame&, int keyframe, const RunState& state) {
+void LiveState::OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) {
   new_keyframe_ = true;
-  AddPoints(keyframe, *state.odometry);
-}
-
-void LiveState::AddPoints(int keyframe, const Odometry& odometry) {
   LivePoints points;
   points.keyframe = keyframe;
-  points.points = SomePoints(ViewOf(odometry.map(), keyframe));
+  SeeSurface(frame, rig_, &points);
+  AddPoints(std::move(points), *state.odometry);
+}
+
+void LiveState::AddPoints(LivePoints points, const Odometry& odometry) {
+  points.points = SomePoints(ViewOf(odometry.map(), points.keyframe));
   const std::lock_guard<std::mutex> lock(mutex_);
   points.number = next_points_++;
   points_.push_back(std::move(points));

@@ -60,12 +60,17 @@ struct LiveLoop {
   bool accepted = false;
 };
 
-/// Some landmarks of a keyframe, in its camera's frame [m].
+/// What a keyframe sees, in its camera's frame [m]: a correction moves it with the keyframe.
 struct LivePoints {
   std::uint64_t number = 0;
   int keyframe = -1;
-  std::vector<Eigen::Vector3f> points;
+  std::vector<Eigen::Vector3f> points;   ///< some landmarks
+  std::vector<Eigen::Vector3f> surface;  ///< thinned depth image; empty without depth
+  std::vector<std::uint8_t> greys;       ///< of `surface`
 };
+
+/// Fills `surface` and `greys` from a depth image or a stereo pair, at most LiveState::kSurfacePerKeyframe.
+void SeeSurface(const InputFrame& frame, const CameraRig& rig, LivePoints* points);
 
 /// Where a frame was found in the map, or, where frames are only located, where it is.
 struct LiveSpot {
@@ -114,6 +119,7 @@ class LiveState : public RunObserver {
   static constexpr std::size_t kMostEvents = 400;
   static constexpr std::size_t kMostPoints = 1500;  ///< keyframes with points
   static constexpr std::size_t kPointsPerKeyframe = 40;
+  static constexpr std::size_t kSurfacePerKeyframe = 320;
   static constexpr std::size_t kMostSpots = 5000;
 
   explicit LiveState(LiveViewOptions options = {}) : options_(std::move(options)) {}
@@ -146,7 +152,7 @@ class LiveState : public RunObserver {
  private:
   void Changed();                  // with mutex_ held
   void AddEvent(LiveEvent event);  // with mutex_ held
-  void AddPoints(int keyframe, const Odometry& odometry);
+  void AddPoints(LivePoints points, const Odometry& odometry);
   // The map that the run began with.
   void SetMap(const RunState& state);
   void AddSpot(const LiveFrame& frame, const RunState& state);
@@ -164,6 +170,7 @@ class LiveState : public RunObserver {
   bool closed_ = false;
   double last_viewer_s_ = 0;
   // What follows belongs to the tracking thread alone.
+  CameraRig rig_;
   bool begun_ = false, joined_ = false;
   std::size_t loops_seen_ = 0, accepted_seen_ = 0;
   int corrections_seen_ = 0;

@@ -120,6 +120,29 @@ function mapNote(run) {
   return `${aligned}${shown} Rejected and missed loops: tap their name in the legend.${rest}`;
 }
 
+// The dense surface of `tutti dense`: places are 16 bit steps from a corner of its box.
+function surfaceOf(run) {
+  if (!run.surface) return null;
+  const bytes = (name) => Uint8Array.from(atob(run.surface[name]), (c) => c.charCodeAt(0));
+  const numbers = (name) => new Uint16Array(bytes(name).buffer);
+  const every = (values, k, make = (v) => v) => Array.from({ length: values.length / 3 }, (_, i) => make(values[3 * i + k]));
+  const places = numbers('places'), corners = numbers('corners'), colours = bytes('colours');
+  const [x, y, z] = AXES.map((_, k) => every(places, k, (v) => run.surface.low[k] + run.surface.step * v));
+  const [i, j, k] = AXES.map((_, n) => every(corners, n));
+  const vertexcolor = Array.from({ length: colours.length / 3 }, (_, n) => `rgb(${colours.subarray(3 * n, 3 * n + 3).join()})`);
+  return { type: 'mesh3d', name: 'surface', showlegend: true, hoverinfo: 'skip', x, y, z, i, j, k, vertexcolor,
+    flatshading: true, lighting: { ambient: 0.85, diffuse: 0.35, specular: 0, fresnel: 0 } };
+}
+
+// From where a surface is looked at: from the side of the cameras that saw it; without one from a corner.
+function towards(surface, path, up) {
+  const corner = [0.7, 0.7, 0.7];
+  if (!surface) return corner;
+  const middle = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
+  const side = AXES.map((a, k) => (k === up ? 0 : middle(path[a].filter(isNumber)) - middle(surface[a]))), length = Math.hypot(...side);
+  return length > 0.1 * Math.hypot(...extents(surface)) ? side.map((v) => v / length) : corner;
+}
+
 async function draw3d(panel) {
   const run = chosen();
   const { up } = planeOf(mainPath());
@@ -127,19 +150,21 @@ async function draw3d(panel) {
   make.size = 4;
   const traces = toldApart(paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.names.join(', ')),
     line: lineOf(line.names.at(-1), line.width + 2), hovertemplate: '%{x:.2f}, %{y:.2f}, %{z:.2f}' })));
-  const landmarks = run.landmarks ?? { x: [], y: [], z: [] };
+  const landmarks = run.landmarks ?? { x: [], y: [], z: [] }, surface = surfaceOf(run);
   if (landmarks.x.length) {
     traces.unshift({ ...make(AXES.map((a) => landmarks[a])), mode: 'markers', name: 'landmarks', hoverinfo: 'skip',
+      visible: surface ? 'legendonly' : true,
       marker: { size: 1.6, color: css('--faint'), opacity: 0.7 } });
   }
+  if (surface) traces.unshift(surface);
   traces.push(...edgeTraces(run, make), ...foundTraces(run, make));
   const sign = up === 1 ? -1 : 1;  // a camera's y points down
   // All of it at first sight: a box whose longest side is 1, seen from as far as its diagonal needs.
-  const size = boxOf([...paths().map((line) => line.path), landmarks]), longest = Math.max(...size, 1e-9);
+  const size = boxOf([...paths().map((line) => line.path), surface ?? landmarks]), longest = Math.max(...size, 1e-9);
   const box = size.map((side) => Math.max(side / longest, 0.05));
   const away = (narrow() ? 1.6 : 1.1) * Math.hypot(...box);
-  const eye = [away * 0.7, away * 0.7, away * 0.7];
-  eye[up] = away * sign;
+  const eye = towards(surface, run.slam, up).map((share) => away * share);
+  eye[up] = away * (surface ? 0.6 : 1) * sign;
   const vector = (v) => ({ x: v[0], y: v[1], z: v[2] });
   const scene = { aspectmode: 'manual', aspectratio: vector(box), camera: { up: vector([0, 1, 2].map((k) => (k === up ? sign : 0))), eye: vector(eye) } };
   for (const a of AXES) {

@@ -14,7 +14,7 @@ const css = (name) => getComputedStyle(document.documentElement).getPropertyValu
 const token = new URLSearchParams(location.search).get('token');
 const address = (path, query = {}) => `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
 
-const state = { news: null, picture: null, answers: [], spots: [], points: new Map(), view: null, turn: null, received: 0, speed: [] };
+const state = { news: null, picture: null, answers: [], spots: [], points: new Map(), surfaces: new Map(), showSurfaces: true, view: null, turn: null, received: 0, speed: [] };
 
 function sharp(canvas, ratio) {
   const width = Math.round(canvas.clientWidth * devicePixelRatio), height = Math.round(width * ratio);
@@ -69,6 +69,36 @@ function onScreen([x, y, z], turn) {
   if (!turn) return [x, z];
   const ahead = Math.cos(turn.yaw) * z - Math.sin(turn.yaw) * x;
   return [Math.cos(turn.yaw) * x + Math.sin(turn.yaw) * z, Math.sin(turn.pitch) * ahead - Math.cos(turn.pitch) * y];
+}
+
+// How far away from a viewer who looks at the turned map, in metres.
+const away = ([x, y, z], turn) => Math.cos(turn.pitch) * (Math.cos(turn.yaw) * z - Math.sin(turn.yaw) * x) + Math.sin(turn.pitch) * y;
+
+// Depth images of keyframes, thinned, where the keyframes are now; the nearest point of each pixel is seen.
+function drawSurfaces(context, canvas, at, poses) {
+  const { width, height } = canvas, picture = context.createImageData(width, height), pixels = new Uint32Array(picture.data.buffer);
+  const nearest = new Float32Array(width * height).fill(Infinity), side = Math.max(2, Math.round(1.5 * devicePixelRatio));
+  for (const [id, { places, greys }] of state.surfaces) {
+    if (!poses.has(id)) continue;
+    for (let i = 0; i < greys.length; ++i) {
+      const p = transform(poses.get(id), places.subarray(3 * i, 3 * i + 3)), [u, v] = at(p).map(Math.round), far = away(p, state.turn);
+      if (!(u >= 0 && v >= 0 && u + side < width && v + side < height)) continue;
+      for (let k = 0; k < side * side; ++k) {
+        const pixel = u + k % side + width * (v + Math.floor(k / side));
+        if (far >= nearest[pixel]) continue;
+        nearest[pixel] = far;
+        pixels[pixel] = 0xff000000 | greys[i] * 0x010101;
+      }
+    }
+  }
+  const layer = new OffscreenCanvas(width, height);
+  layer.getContext('2d').putImageData(picture, 0, 0);
+  context.drawImage(layer, 0, 0);
+}
+
+function unpack(text) {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0)), count = bytes.length / 13;  // 3 floats and a grey each
+  return { places: new Float32Array(bytes.buffer, 0, 3 * count), greys: bytes.subarray(12 * count) };
 }
 
 // Where most landmarks are seen: the middle 90 % of them along either axis, of a sample.
@@ -163,6 +193,7 @@ function drawMap() {
     }
   }
   context.globalAlpha = 1;
+  if (state.turn && state.showSurfaces && state.surfaces.size) drawSurfaces(context, canvas, at, poses);
   context.lineWidth = 2 * devicePixelRatio;
   for (let session = 0; session < state.news.sessions; ++session) {  // this run's above those of before
     context.strokeStyle = sessionColor(session);
@@ -294,12 +325,17 @@ function draw() {
 
 function take(news) {
   state.news = news;
-  for (const [id, points] of news.points) state.points.set(id, points);
+  for (const [id, points, surface] of news.points) {
+    state.points.set(id, points);
+    if (surface) state.surfaces.set(id, unpack(surface));
+  }
+  document.body.dataset.surfaces = state.surfaces.size;
   state.spots.push(...news.spots);
   state.spots.splice(0, state.spots.length - MOST_SPOTS);
   for (const event of news.events) if ('query' in event) state.answers.push(event);
   state.answers.splice(0, state.answers.length - MOST_ANSWERS);
   addLines(news.events);
+  by('surfaces').hidden = !state.turn || !state.surfaces.size;
   showLegend();
   showStatus();
   document.body.dataset.received = ++state.received;
@@ -349,10 +385,18 @@ function turnMap(on) {
   state.view = null;
   by('space').setAttribute('aria-pressed', String(on));
   by('space').textContent = on ? 'From above' : '3D';
+  by('surfaces').hidden = !on || !state.surfaces.size;
   by('map-words').textContent = on ? 'Map in 3D. Drag turns, with Shift it moves.' : 'Map, top view. Drag moves.';
   draw();
 }
 
+function showSurfaces(on) {
+  state.showSurfaces = on;
+  by('surfaces').setAttribute('aria-pressed', String(on));
+  draw();
+}
+
+by('surfaces').addEventListener('click', () => showSurfaces(!state.showSurfaces));
 by('space').addEventListener('click', () => turnMap(!state.turn));
 by('pause').addEventListener('click', () => command(state.news?.paused ? 'resume' : 'pause'));
 by('step').addEventListener('click', () => command('step'));

@@ -109,6 +109,10 @@ async function drive(browser, folder, data) {
   await mapChanges(above);
   check(await page.evaluate(inked, 'map'), 'the map in 3D is not empty');
   const turned = await map();
+  check(await page.evaluate(() => Number(document.body.dataset.surfaces)) > 0, 'keyframes have surfaces');
+  await page.click('#surfaces');
+  await mapChanges(turned);
+  await page.click('#surfaces');
   await page.click('#space');
   await mapChanges(turned);
   check(await page.evaluate(() => document.getElementById('space').textContent === '3D'), 'from above again');

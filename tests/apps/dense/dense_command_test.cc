@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <opencv2/imgcodecs.hpp>
 
+#include "apps/reconstruct/depth_source.h"
+#include "apps/reconstruct/report_surface.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
 #include "tests/support/small_room.h"
@@ -108,6 +111,62 @@ TEST(DenseCommand, BadCallsAreOneLineThatSaysWhatToDo) {
                 {"voxel_m"});
 }
 
+TEST(DenseCommand, SaysWhereDepthAndPosesDisagree) {
+  const RoomRun room(SyntheticSensor::kRgbd);
+  const fs::path data = room.folder / "data";
+  fs::copy(room.data, data, fs::copy_options::recursive);
+  std::vector<fs::path> files(fs::directory_iterator(data / "depth"), fs::directory_iterator{});
+  std::sort(files.begin(), files.end());
+  for (const std::size_t frame : {15, 16, 20}) {
+    cv::Mat depth = cv::imread(files[frame].string(), cv::IMREAD_UNCHANGED);
+    cv::imwrite(files[frame].string(), 1.1 * depth);
+  }
+  const std::string said =
+      Done(RunTutti({"dense", room.run, data, "--mesh", room.folder / "mesh.ply", "--voxel", "0.04"}));
+  EXPECT_THAT(said, HasSubstr("depth and poses disagree in 3 frames (15 to 16, 20)"));
+  const std::string good = Done(RunTutti({"dense", room.run, "--mesh", room.folder / "mesh.ply"}));
+  EXPECT_THAT(good, Not(HasSubstr("disagree")));
+}
+
+TEST(PosedFrame, IsWhereItsNeighboursSayAMomentBeforeAndAfter) {
+  PosedFrame frame;
+  frame.T_world_camera.translation = {1, 2, 3};
+  frame.velocity_before.head<3>() = Eigen::Vector3d(10, 0, 0);
+  frame.velocity_after.head<3>() = Eigen::Vector3d(0, 20, 0);
+  EXPECT_NEAR((frame.PoseLater(-0.1).translation - Eigen::Vector3d(0, 2, 3)).norm(), 0, 1e-12);
+  EXPECT_NEAR((frame.PoseLater(0.1).translation - Eigen::Vector3d(1, 4, 3)).norm(), 0, 1e-12);
+}
+
+TEST(ReportSurface, IsThinnedToWhatIsAskedForAndKeepsItsShape) {
+  TriangleMesh wall;
+  constexpr std::uint32_t kSide = 120;
+  for (std::uint32_t y = 0; y < kSide; ++y) {
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      wall.vertices.points.emplace_back(0.01F * static_cast<float>(x), 0.01F * static_cast<float>(y), 5);
+      wall.vertices.colours.push_back({{200, 100, 10}});
+      const std::uint32_t at = y * kSide + x;
+      if (x + 1 == kSide || y + 1 == kSide) continue;
+      wall.triangles.push_back({{at, at + 1, at + kSide}});
+      wall.triangles.push_back({{at + 1, at + kSide + 1, at + kSide}});
+    }
+  }
+  const TriangleMesh thin = Thinned(wall, 500);
+  EXPECT_LE(thin.vertices.points.size(), 500u);
+  EXPECT_GT(thin.vertices.points.size(), 250u);
+  double area = 0;
+  for (const auto& [a, b, c] : thin.triangles) {
+    const Eigen::Vector3f& corner = thin.vertices.points.at(a);
+    const Eigen::Vector3f normal =
+        (thin.vertices.points.at(b) - corner).cross(thin.vertices.points.at(c) - corner);
+    EXPECT_GT(normal.z(), 0);
+    area += 0.5 * static_cast<double>(normal.z());
+  }
+  EXPECT_NEAR(area, 1.19 * 1.19, 0.2);
+  EXPECT_NEAR(thin.vertices.points.front().z(), 5, 1e-6);
+  EXPECT_EQ(thin.vertices.colours.front(), (std::array<std::uint8_t, 3>{{200, 100, 10}}));
+  EXPECT_EQ(Thinned(wall, 100000).vertices.points.size(), wall.vertices.points.size());
+}
+
 TEST(DenseCommand, CtrlCWritesWhatIsComplete) {
   const RoomRun room(SyntheticSensor::kRgbd);
   const testing::ProcessResult run =
@@ -122,9 +181,10 @@ TEST(DenseCommand, CtrlCWritesWhatIsComplete) {
 TEST(DenseCommand, ARunMakesAMeshAtItsEnd) {
   const RoomRun room(SyntheticSensor::kRgbd);
   const fs::path out = room.folder / "out";
-  const std::string said = Done(RunTutti(testing::RunArguments(room.data / "config.yaml", room.data, out,
-                                                               {"--no-report", "--no-loops", "--dense"})));
-  EXPECT_THAT(said, HasSubstr("mesh: "));
+  const std::string said = Done(
+      RunTutti(testing::RunArguments(room.data / "config.yaml", room.data, out, {"--no-loops", "--dense"})));
+  EXPECT_THAT(said, HasSubstr("mesh.ply: "));
+  EXPECT_THAT(ReadAll(out / "report.json"), HasSubstr("\"surface\":{\"low\":["));
   EXPECT_GT(fs::file_size(out / "mesh.ply"), 20000u);
   ExpectRefusal(
       RunTutti(testing::RunArguments(room.data / "config.yaml", room.data, out, {"--dense", "--no-map"})),

@@ -107,59 +107,6 @@ TEST(DenseFiles, AFullDiskIsSaidAndLeavesWhatWasThere) {
   EXPECT_EQ(ReadAll(file), "before");
 }
 
-// Cells of a world that a face runs through, between these heights above the ground.
-class TrueCells {
- public:
-  TrueCells(const SyntheticWorld& world, const OccupancyGrid& grid, double low_m, double high_m)
-      : grid_(grid), occupied_(cv::Mat::zeros(grid.cells.size(), CV_8UC1)) {
-    const double step = 0.25 * grid.cell_m;
-    for (const synthetic::Face& face : StillFaces(world)) {
-      const int us = static_cast<int>(face.edge_u.norm() / step) + 1,
-                vs = static_cast<int>(face.edge_v.norm() / step) + 1;
-      for (int u = 0; u <= us; ++u)
-        for (int v = 0; v <= vs; ++v)
-          Set(grid.T_map_world * (face.corner + face.edge_u * u / us + face.edge_v * v / vs), low_m, high_m);
-    }
-  }
-  // Share of the known cells that are right: occupied with a face in it or in a neighbour, free without one
-  // in it.
-  double ShareOfRight() const {
-    cv::Mat near = occupied_.clone();
-    for (int y = 0; y < near.rows; ++y)
-      for (int x = 0; x < near.cols; ++x) near.at<std::uint8_t>(y, x) = Near(y, x);
-    double known = 0, right = 0;
-    for (int y = 0; y < near.rows; ++y) {
-      for (int x = 0; x < near.cols; ++x) {
-        const int cell = grid_.cells.at<std::int8_t>(y, x);
-        if (cell < 0) continue;
-        ++known;
-        right +=
-            (cell > 0 ? near.at<std::uint8_t>(y, x) != 0 : occupied_.at<std::uint8_t>(y, x) == 0) ? 1 : 0;
-      }
-    }
-    return right / known;
-  }
-
- private:
-  void Set(const Eigen::Vector3d& at, double low_m, double high_m) {
-    if (at.z() < low_m || at.z() > high_m) return;
-    const auto x = static_cast<int>(std::floor((at.x() - grid_.origin.x()) / grid_.cell_m));
-    const auto y = static_cast<int>(std::floor((at.y() - grid_.origin.y()) / grid_.cell_m));
-    if (x >= 0 && y >= 0 && x < occupied_.cols && y < occupied_.rows) occupied_.at<std::uint8_t>(y, x) = 1;
-  }
-  std::uint8_t Near(int y, int x) const {
-    for (int dy = -1; dy <= 1; ++dy)
-      for (int dx = -1; dx <= 1; ++dx)
-        if (y + dy >= 0 && x + dx >= 0 && y + dy < occupied_.rows && x + dx < occupied_.cols &&
-            occupied_.at<std::uint8_t>(y + dy, x + dx) != 0)
-          return 1;
-    return 0;
-  }
-
-  const OccupancyGrid& grid_;
-  cv::Mat occupied_;
-};
-
 double RightCellsOf(SyntheticScene scene, bool kinect_noise) {
   SyntheticOptions options = testing::SmallRgbdRoom(160, 120);
   options.scene = scene;
@@ -180,7 +127,7 @@ double RightCellsOf(SyntheticScene scene, bool kinect_noise) {
   const OccupancyGrid grid = GridOf(space);
   EXPECT_GT(cv::countNonZero(grid.cells == 0), 2000);
   EXPECT_GT(cv::countNonZero(grid.cells == 100), 300);
-  return TrueCells(world.World(), grid, 0.1, 1.0).ShareOfRight();
+  return testing::ShareOfRightCells(world.World(), grid, 0.1, 1.0);
 }
 
 TEST(DenseGrid, TheCellsOfARoomAreRight) {

@@ -85,6 +85,23 @@ TEST(DenseMap, NoiseOfAKinectAveragesOut) {
   const testing::KnownGeometry geometry(StillFaces(world.World()), 1);
   const testing::SurfaceQuality quality = testing::Measure(map.Mesh().vertices, geometry, {}, kVoxel);
   EXPECT_LT(quality.rms, 0.004);
+  EXPECT_EQ(map.Report().apart, 0u);
+}
+
+TEST(DenseMap, DepthThatLiesElsewhereThanTheSurfaceIsCounted) {
+  DenseMap map(Voxels(kVoxel));
+  const auto look = [&](double from_z) {
+    Pose pose;
+    pose.translation.z() = from_z;
+    ASSERT_EQ(map.Integrate(Wall(1), {}, pose, Camera()), "");
+  };
+  for (int i = 0; i < 5; ++i) look(0.01 * i - 0.02);
+  EXPECT_EQ(map.Report().apart, 0u);
+  look(-0.1);
+  EXPECT_EQ(map.Report().apart, 1u);
+  EXPECT_NEAR(map.Report().apart_m, 0.1, 0.01);
+  look(3);  // of a wall that nothing is known about
+  EXPECT_EQ(map.Report().apart, 1u);
 }
 
 TEST(DenseMap, TrianglesAndNormalsFaceTheCamera) {

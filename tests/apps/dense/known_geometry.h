@@ -34,6 +34,10 @@ struct SurfaceQuality {
 SurfaceQuality Measure(const PointCloud& surface, const KnownGeometry& geometry,
                        const std::vector<Eigen::Vector3d>& seen, double within_m);
 
+/// Share of the known cells of GridOf(space, low_m, high_m) that are right: occupied with a face of the world
+/// in it or in a neighbour, free without one in it.
+double ShareOfRightCells(const SyntheticWorld& world, const OccupancyGrid& grid, double low_m, double high_m);
+
 /// Every `step`-th pixel of a depth image, in the world.
 void AppendSeen(const cv::Mat& depth_m, const Pose& T_world_camera, const PinholeCamera& camera, int step,
                 std::vector<Eigen::Vector3d>* seen);

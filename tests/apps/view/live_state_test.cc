@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <thread>
 
 namespace tutti::view {
@@ -63,6 +65,47 @@ TEST(LiveState, APauseThatIsAskedForStandsWhenTheFrameThatWasBegunIsDone) {
   state.Log("it goes on");
   take_news();
   EXPECT_FALSE(news.paused || news.standing);
+}
+
+// A wall before a camera at 2 m, seen by a sensor.
+InputFrame WallSeenBy(Sensor sensor, CameraRig* rig) {
+  rig->sensor = sensor;
+  rig->camera.width = 640, rig->camera.height = 480;
+  rig->camera.fx = rig->camera.fy = 400, rig->camera.cx = 320, rig->camera.cy = 240;
+  rig->baseline_m = 0.1;
+  InputFrame frame;
+  cv::Mat texture(480, 640 + 20, CV_8UC1);
+  cv::theRNG().state = 7;
+  cv::randu(texture, 0, 255);
+  cv::GaussianBlur(texture, texture, {}, 3);
+  cv::normalize(texture, texture, 0, 255, cv::NORM_MINMAX);
+  frame.image = texture(cv::Rect(0, 0, 640, 480)).clone();
+  if (sensor == Sensor::kRgbd) frame.depth_m = cv::Mat(480, 640, CV_32FC1, cv::Scalar(2));
+  if (sensor == Sensor::kStereo) frame.right = texture(cv::Rect(20, 0, 640, 480)).clone();  // fx b / z
+  return frame;
+}
+
+TEST(LiveSurface, IsWhatTheDepthOfEitherSensorShows) {
+  for (const Sensor sensor : {Sensor::kRgbd, Sensor::kStereo, Sensor::kMono}) {
+    CameraRig rig;
+    const InputFrame frame = WallSeenBy(sensor, &rig);
+    LivePoints points;
+    SeeSurface(frame, rig, &points);
+    ASSERT_EQ(points.surface.size(), points.greys.size());
+    EXPECT_LE(points.surface.size(), LiveState::kSurfacePerKeyframe);
+    if (sensor == Sensor::kMono) {
+      EXPECT_TRUE(points.surface.empty());
+      continue;
+    }
+    EXPECT_GT(points.surface.size(), LiveState::kSurfacePerKeyframe / 2);
+    for (std::size_t i = 0; i < points.surface.size(); ++i) {
+      const Eigen::Vector3d at = points.surface[i].cast<double>();
+      EXPECT_NEAR(at.z(), 2, sensor == Sensor::kRgbd ? 1e-6 : 0.1);
+      const int u = static_cast<int>(std::lround(400 * at.x() / at.z() + 320)),
+                v = static_cast<int>(std::lround(400 * at.y() / at.z() + 240));
+      EXPECT_EQ(points.greys[i], frame.image.at<std::uint8_t>(v, u));
+    }
+  }
 }
 
 }  // namespace

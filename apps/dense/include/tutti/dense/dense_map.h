@@ -87,6 +87,10 @@ struct DenseReport {
   std::size_t blocks = 0;      ///< of 8 x 8 x 8 voxels
   double memory_mb = 0;        ///< of the voxels
   std::size_t cut = 0;         ///< frames of which something was left out, for memory_mb was reached
+  /// Frames whose depth lies elsewhere than the surface that frames before had measured: their poses are
+  /// wrong, things have moved, or depth and image have different clocks.
+  std::size_t apart = 0;
+  double apart_m = 0;  ///< by how much, in the median of a frame: the worst [m]
 };
 
 /// A truncated signed distance function (B. Curless, M. Levoy, "A volumetric method for building complex

@@ -1,4 +1,4 @@
-#include "apps/reconstruct/navigation_files.h"
+#include "apps/reconstruct/written_maps.h"
 #include "core/replaced_file.h"
 #include "tutti/core/error.h"
 

@@ -6,8 +6,7 @@
 #include <system_error>
 
 #include "apps/reconstruct/depth_source.h"
-#include "apps/reconstruct/navigation_files.h"
-#include "apps/reconstruct/report_surface.h"
+#include "apps/reconstruct/written_maps.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/progress.h"
 #include "core/parallel.h"

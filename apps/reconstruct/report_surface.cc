@@ -1,4 +1,4 @@
-#include "apps/reconstruct/report_surface.h"
+#include "apps/reconstruct/written_maps.h"
 
 #include <algorithm>
 #include <array>

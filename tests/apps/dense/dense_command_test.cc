@@ -6,7 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "apps/reconstruct/depth_source.h"
-#include "apps/reconstruct/report_surface.h"
+#include "apps/reconstruct/written_maps.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
 #include "tests/support/small_room.h"

@@ -119,7 +119,7 @@ class LiveState : public RunObserver {
   static constexpr std::size_t kMostEvents = 400;
   static constexpr std::size_t kMostPoints = 1500;  ///< keyframes with points
   static constexpr std::size_t kPointsPerKeyframe = 40;
-  static constexpr std::size_t kSurfacePerKeyframe = 320;
+  static constexpr std::size_t kSurfacePerKeyframe = 600;
   static constexpr std::size_t kMostSpots = 5000;
 
   explicit LiveState(LiveViewOptions options = {}) : options_(std::move(options)) {}

@@ -138,10 +138,10 @@ class StateWriter {
   }
   void Put(const GrowingNumbers& numbers) {
     out_.PutVarint(numbers.values->size());
-    int least = 0;
+    std::int64_t least = 0;  // one more than the greatest int does not fit into an int
     for (const int value : *numbers.values) {
       out_.PutVarint(static_cast<std::uint64_t>(value - least));
-      least = value + 1;
+      least = std::int64_t{value} + 1;
     }
   }
   template <class T, int R, int C>

@@ -44,6 +44,17 @@ std::string Output(int pipe, pid_t child, const std::string& text, int signal) {
   return output;
 }
 
+// A copy of a process does not have the threads that libraries started when they were loaded; the leak
+// checker says so of each.
+std::string WithoutMissingThreads(const std::string& output) {
+  std::string kept;
+  std::istringstream lines(output);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find("was not suspended. False leaks are possible.") == std::string::npos) kept += line + '\n';
+  }
+  return kept.size() == output.size() + 1 ? output : kept;
+}
+
 int ExitStatus(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
 
 }  // namespace
@@ -94,7 +105,7 @@ ProcessResult RunTutti(std::vector<std::string> arguments, const std::vector<std
   const int served = BeginServed(TUTTI_IMAGES_EXECUTABLE, arguments, pipe_ends[1]);
   close(pipe_ends[1]);
   ProcessResult result;
-  result.output = Output(pipe_ends[0], 0, "", 0);
+  result.output = WithoutMissingThreads(Output(pipe_ends[0], 0, "", 0));
   result.status = ExitStatus(EndServed(served));
   return result;
 }

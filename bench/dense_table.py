@@ -14,10 +14,14 @@ import statistics
 import subprocess
 import tempfile
 
-import numpy as np
-import open3d as o3d
-from PIL import Image
-from scipy.spatial import cKDTree
+try:
+    import numpy as np
+    import open3d as o3d
+    from PIL import Image
+    from scipy.spatial import cKDTree
+except ImportError as missing:  # said when a row needs them; --help does not
+    np = o3d = Image = cKDTree = None
+    MISSING = missing
 
 import table
 

@@ -20,8 +20,7 @@ try:
     from PIL import Image
     from scipy.spatial import cKDTree
 except ImportError as missing:  # said when a row needs them; --help does not
-    np = o3d = Image = cKDTree = None
-    MISSING = missing
+    np, MISSING = None, missing
 
 import table
 
@@ -202,6 +201,8 @@ ROWS = {
 def main():
     parser = table.parser(__doc__, "dense", ROWS)
     a = table.parse(parser, ROWS)
+    if np is None:
+        parser.error(f"{MISSING}; Debian: apt-get install python3-open3d python3-scipy python3-pil")
     made = {}
     for name in a.rows:  # each is kept as soon as it is there
         made = table.put_json(a, "dense", {name: list(ROWS[name](a))})

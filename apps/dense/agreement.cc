@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kColumns = 16, kRows = 12;  // of rays
 constexpr std::size_t kLeastRays = 40;
-constexpr double kSearchedVoxels = 16;       // to both sides of what was measured
+constexpr double kSearchedVoxels = 16;    // to both sides of what was measured
 constexpr double kStepVoxels = 0.5;       // along a ray
 constexpr double kTolerantVoxels = 2;     // what voxels and noise explain: this,
 constexpr double kTolerantNoise = 0.005;  // and of structured light and time of flight this times z^2 [1/m]

@@ -28,6 +28,7 @@ enum class OdometrySection : std::uint32_t {
   kTimes,             ///< milliseconds by stage, the only thing that varies from run to run
   kGlobalAdjustment,  ///< GlobalAdjustment::SaveSections
   kImage,             ///< of the keyframe that follows, if it has it still
+  kImu,               ///< measurements, before kTimes; absent without an IMU
   kEndOfOdometry = 199
 };
 

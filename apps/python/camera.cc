@@ -32,7 +32,7 @@ std::string DescribeCamera() {
 }
 
 PinholeCamera CameraOf(const py::kwargs& keywords) {
-  for (const char* of_the_rig : {"baseline_m", "readout_s", "depth_delay_s", "right"}) {
+  for (const char* of_the_rig : {"baseline_m", "readout_s", "depth_delay_s", "T_camera_imu", "right"}) {
     if (keywords.contains(of_the_rig))
       throw py::type_error("Camera: " + std::string(of_the_rig) +
                            " is told to the Rig, or to Dataset(camera={...})");

@@ -141,6 +141,36 @@ Json ClocksJson(const RunResult& r) {
   return json;
 }
 
+// What an IMU shows by itself, and what the images say of it.
+Json ImuJson(const ImuReport& imu) {
+  Json json = {{"measurements", imu.samples},
+               {"rate_hz", imu.rate_hz},
+               {"duration_s", imu.duration_s},
+               {"missing_share", imu.missing_share},
+               {"longest_gap_s", imu.longest_gap_s},
+               {"acceleration_mps2", imu.acceleration_mps2},
+               {"used", imu.trusted},
+               {"findings", Json::array()}};
+  for (const ImuFinding& finding : imu.findings)
+    json["findings"].push_back({{"measured", finding.measured}, {"advice", finding.advice}});
+  if (!(imu.agreement > 0)) return json;
+  const auto vector = [](const auto& v) { return Json{v.x(), v.y(), v.z()}; };
+  json["images_say"] = {{"steps", imu.steps},
+                        {"turned_deg", imu.turned_deg},
+                        {"agreement", imu.agreement},
+                        {"residual_deg", imu.residual_deg},
+                        {"time_offset_s", imu.time_offset_s},
+                        {"time_offset_sigma_s", imu.time_offset_sigma_s},
+                        {"gyro_bias_rad_s", vector(imu.gyro_bias)},
+                        {"mounting_sigma_deg", imu.mounting_sigma_deg}};
+  if (imu.R_camera_imu) {
+    Json q = vector(*imu.R_camera_imu);
+    q.push_back(imu.R_camera_imu->w());
+    json["images_say"]["R_camera_imu_xyzw"] = q;
+  }
+  return json;
+}
+
 // What self-calibration says of the lens.
 Json LensJson(const LensFound& lens) {
   Json json = {{"k1", lens.k1},
@@ -320,6 +350,7 @@ std::string SummaryJson(const RunResult& r) {
   if (r.focal_length) json["focal_length"] = FocalLengthJson(r);
   if (r.lens) json["lens"] = LensJson(*r.lens);
   if (r.clocks || r.clocks_used) json["clocks"] = ClocksJson(r);
+  if (r.imu) json["imu"] = ImuJson(*r.imu);
   if (r.height)
     json["height"] = {{"height", r.height->height},
                       {"measurements", r.height->measurements},

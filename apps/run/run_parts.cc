@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "core/numbers.h"
 #include "tutti/core/error.h"
@@ -60,6 +61,7 @@ double ProcessCpuSeconds() {
 
 RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
   if (request.no_loops) config.run.loops = false;
+  if (request.no_imu) config.dataset.imu = false;
   if (request.follow_s) config.dataset.follow_s = *request.follow_s;
   if (request.start) config.dataset.start = *request.start;
   if (request.end) config.dataset.end = *request.end;
@@ -167,6 +169,15 @@ void CollectMap(const RunState& state, RunResult& result) {
   result.lens = report.lens;
   result.clocks = report.clocks;
   result.height = report.height;
+  if (result.imu && report.imu) {  // what the file shows, and what the images say
+    const ImuReport file = *std::exchange(result.imu, report.imu);
+    result.imu->samples = file.samples;
+    result.imu->rate_hz = file.rate_hz;
+    result.imu->duration_s = file.duration_s;
+    result.imu->missing_share = file.missing_share;
+    result.imu->longest_gap_s = file.longest_gap_s;
+    result.imu->acceleration_mps2 = file.acceleration_mps2;
+  }
   result.map_figures = MeasureMap(odometry, session);
   CollectKeyframes(odometry, session, result);
 }

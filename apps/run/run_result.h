@@ -166,6 +166,7 @@ struct RunResult {
   std::optional<ClocksFound> clocks_used;  ///< measured, and put into config; standard deviation 0: not
   int begun_anew = 0;                      ///< so often, with what was measured of the clocks
   std::optional<HeightFound> height;       ///< mono, where the ground was seen
+  std::optional<ImuReport> imu;            ///< of the IMU beside the images: by itself, then by them
 
   std::filesystem::path folder;  ///< where everything was written: RunRequest::out, or "unfinished" inside
 

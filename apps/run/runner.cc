@@ -114,6 +114,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   datasets.push_back(odometry ? odometry->Open() : OpenDataset(request.dataset, result.config.dataset));
   const Dataset* const dataset = datasets.back().get();
   result.rig = dataset->Rig();
+  result.imu = dataset->Imu();
   if (auto& camera = result.config.dataset.camera; camera && camera->width == 0) {  // of a pipe
     camera->width = result.rig.camera.width;
     camera->height = result.rig.camera.height;

@@ -29,6 +29,7 @@ struct RunRequest {
   std::optional<std::filesystem::path> ground_truth;  ///< "none": don't evaluate; default: the data set's own
   bool keep = false;  ///< number an earlier result in `out` instead of replacing it
   bool no_loops = false;
+  bool no_imu = false;                ///< leave an IMU beside the images out
   std::optional<std::uint64_t> seed;  ///< of everything that draws numbers
   std::optional<int> threads;
   std::optional<int> inject_false_loops;  ///< instead of run.inject_false_loops

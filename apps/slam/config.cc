@@ -226,7 +226,7 @@ std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
   std::vector<ConfigEntry> entries;
   for (const ConfigKey& key : table.keys()) {
     const bool of_a_camera = key.section == "camera" && key.name != "baseline_m" && key.name != "readout_s" &&
-                             key.name != "depth_delay_s";
+                             key.name != "depth_delay_s" && key.name != "T_camera_imu";
     if (of_a_camera && !config.dataset.camera) continue;
     if (key.section == "camera.right" && !config.dataset.right) continue;
     entries.push_back({key.section, key.name, key.show(), key.doc, key.advanced});

@@ -18,6 +18,7 @@
 #include "apps/run/progress.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/generate_path.h"
 #include "apps/tutti/loops/loops_input.h"
 #include "apps/tutti/options.h"
 #include "core/replaced_file.h"
@@ -36,9 +37,11 @@ struct GenerateArguments {
   std::string out;
   std::optional<SyntheticSensor> sensor;
   SyntheticOptions world;
-  std::string from_images, change;  // the first empty: a synthetic world
-  int stride = 1;                   // every stride-th image is taken
-  int change_from = 0;              // those before this one (of the taken) are copied as they are
+  PathArguments path;
+  const CLI::Option* scene = nullptr;  // --world
+  std::string from_images, change;     // the first empty: a synthetic world
+  int stride = 1;                      // every stride-th image is taken
+  int change_from = 0;                 // those before this one (of the taken) are copied as they are
   int threads = 0;
   bool force = false;  // write into a folder that is not empty: its images are removed
 
@@ -229,15 +232,32 @@ int ChangeImages(const GenerateArguments& arguments) {
   return 0;
 }
 
+// What was written along a path.
+int EndPath(const GenerateArguments& arguments, const SyntheticWorld& world, std::size_t frames) {
+  const std::size_t samples = WriteImu(arguments.path, world.Options(), arguments.out);
+  if (frames < world.Size()) return Interrupted(arguments.out, frames, world.Size(), "frames");
+  const char* d = arguments.out.c_str();
+  std::printf("%s: %zu frames", d, frames);
+  if (samples > 0) std::printf(" and %zu measurements of an IMU", samples);
+  std::printf(" along %s, in EuRoC's layout with ground truth. Next:\n  tutti run %s --out %s_run\n",
+              arguments.path.trajectory.c_str(), d, d);
+  return 0;
+}
+
 int Generate(const GenerateArguments& arguments) {
   if (!arguments.from_images.empty()) return ChangeImages(arguments);
   if (!arguments.sensor) throw CLI::RequiredError("--sensor (or --from-images)");
   SyntheticOptions wanted = arguments.world;
   wanted.sensor = *arguments.sensor;
+  SetPath(arguments.path, arguments.scene != nullptr && arguments.scene->count() > 0, &wanted);
   const SyntheticWorld world(wanted);
   const SyntheticOptions& o = world.Options();
-  internal::Say("%zu frames of %dx%d, %.0f m a lap (%zu frames), into %s", world.Size(), o.width, o.height,
-                world.LapLength(), world.FramesPerLap(), arguments.out.c_str());
+  if (o.path)
+    internal::Say("%zu frames of %dx%d along %s, into %s", world.Size(), world.Camera().width,
+                  world.Camera().height, arguments.path.trajectory.c_str(), arguments.out.c_str());
+  else
+    internal::Say("%zu frames of %dx%d, %.0f m a lap (%zu frames), into %s", world.Size(), o.width, o.height,
+                  world.LapLength(), world.FramesPerLap(), arguments.out.c_str());
   SyntheticWriteOptions write;
   write.force = arguments.force;
   write.threads = arguments.Threads();
@@ -245,6 +265,7 @@ int Generate(const GenerateArguments& arguments) {
   write.progress = ReportTo(progress);
   const InterruptGuard guard;
   const std::size_t written = WriteSyntheticDataset(world, arguments.out, write);
+  if (o.path) return EndPath(arguments, world, written);
   if (written < world.Size()) return Interrupted(arguments.out, written, world.Size(), "frames");
   const char* d = arguments.out.c_str();
   if (o.sensor == SyntheticSensor::kSides) {
@@ -308,12 +329,14 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->type_name("NAME");
   const EnumWords<SyntheticScene> scenes = {{"town", SyntheticScene::kTown},
                                             {"room", SyntheticScene::kRoom},
-                                            {"corridor", SyntheticScene::kCorridor}};
-  AddWord(c, "--world", w.scene,
-          "town: streets driven through; room: furnished, walked around in; corridor: plain walls and doors",
-          scenes, CLI::IsMember({"town", "room", "corridor"}))
-      ->type_name("NAME")
-      ->default_str("town");
+                                            {"corridor", SyntheticScene::kCorridor},
+                                            {"hall", SyntheticScene::kHall}};
+  a.scene = AddWord(c, "--world", w.scene,
+                    "town: streets driven through; room: furnished, walked around in; corridor: plain walls "
+                    "and doors; hall: large, with --trajectory",
+                    scenes, CLI::IsMember({"town", "room", "corridor", "hall"}))
+                ->type_name("NAME")
+                ->default_str("town");
   AddDefaulted(c, "--seed", w.seed, "of houses, textures and noise; the same seed gives the same bytes",
                NotNegative());
   AddDefaulted(c, "--laps", w.laps,
@@ -370,6 +393,7 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
                "samples per pixel and axis; 1 is fastest, with jagged edges");
   AddOption(c, "--threads", a.threads, "frames rendered at the same time; 0: as many as cores",
             NotNegative());
+  AddPathOptions(c, a.path);
   c.add_flag("--force", a.force, "write into a folder that is not empty (its old frames are removed)");
   AddChangeOptions(c, a);
 }
@@ -384,6 +408,7 @@ void SetUpGenerate(CLI::App& command, int& exit_code) {
   tutti generate --out room --sensor rgbd --world room --kinect-noise
   tutti generate --out ring --sensor mono --world corridor --rate 1 --width 240 --height 192
   tutti generate --out hard --sensor stereo --noise --blur --lighting-change --moving-objects
+  tutti generate --out flight --sensor stereo --trajectory body.tum --lens euroc --imu adis16448
   tutti generate --out dark --from-images kitchen/rgb --change dark:2 --change-from 250
 The folder also gets a config.yaml: tutti run --config town/config.yaml --dataset town --out result)");
   auto arguments = std::make_shared<GenerateArguments>();

@@ -301,6 +301,7 @@ void SetUpRun(CLI::App& command, int& exit_code) {
       "SECTION.KEY=VALUE: any key of --help-config --advanced, on top of the file (loops.rule=orb, "
       "odometry.features=900, loops.extraction.features=300); may be given several times");
   command.add_flag("--no-loops", request.no_loops, "odometry alone");
+  command.add_flag("--no-imu", request.no_imu, "leave an IMU that lies beside the images out");
   AddSeed(command, request.seed);
   AddThreads(command, request.threads);
   AddOption(

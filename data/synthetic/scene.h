@@ -66,5 +66,7 @@ std::vector<Eigen::Vector2d> SmoothLoop(const std::vector<Eigen::Vector2d>& corn
 Scene BuildTown(const SyntheticOptions& options);
 Scene BuildCorridor(const SyntheticOptions& options);
 Scene BuildRoom(const SyntheticOptions& options);
+/// A room or hall (options.scene) around a way of cameras, which no wall and nothing in it is near to.
+Scene BuildSpaceAround(const SyntheticOptions& options, const std::vector<Eigen::Vector3d>& way);
 
 }  // namespace tutti::synthetic

@@ -2,11 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 namespace tutti {
 
-enum class SyntheticScene { kTown, kRoom, kCorridor };
+namespace synthetic {
+struct GivenPath;
+}
+
+/// kHall, and kRoom with a path, are built around that path.
+enum class SyntheticScene { kTown, kRoom, kCorridor, kHall };
 /// kSides: two cameras that look to the left and to the right of the way, for place recognition.
 enum class SyntheticSensor { kMono, kStereo, kRgbd, kSides };
 
@@ -27,6 +33,10 @@ struct SyntheticOptions {
   double rate_hz = 0;      ///< frames per second; 0: 10 in the town, 15 indoors
   double max_depth_m = 0;  ///< RGB-D: farther depth is not measured [m]; 0: 13 in the town, 8 indoors
   double depth_units_per_m = 5000;  ///< RGB-D: value of one metre in the 16-bit files (which end at 65535)
+
+  /// Poses, frames and cameras that are given (data/synthetic/given_path.h), in the stead of the camera and
+  /// the drive below; a room or a hall. Null: none
+  std::shared_ptr<const synthetic::GivenPath> path;
 
   // The drive.
   double laps = 2;       ///< rounds of the closed route (fractions too); every round after the first revisits

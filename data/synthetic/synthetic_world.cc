@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/synthetic/given_path.h"
 #include "data/synthetic/hills.h"
 #include "data/synthetic/moving_camera.h"
 #include "data/synthetic/scene.h"
@@ -58,6 +59,17 @@ std::string SyntheticOptions::Validate() const {
     return "occlusion and other_cars are the town's alone";
   if (moving_objects < 0 || moving_objects > 100) return "moving_objects must be 0 to 100";
   if (supersample < 1 || supersample > 4) return "supersample must be 1 to 4";
+  if (scene == SyntheticScene::kHall && !path) return "a hall is built around a path; give one";
+  if (!path) return {};
+  if (scene != SyntheticScene::kRoom && scene != SyntheticScene::kHall)
+    return "a path leads through a room or a hall; the town's streets and the corridor have their own";
+  if (sensor == SyntheticSensor::kSides) return "a path is rendered as mono, stereo or rgbd";
+  if (readout_s > 0 || depth_delay_s != 0 || shake_deg_per_s > 0 || moving_objects > 0 || lighting_change ||
+      dusk || bare_fraction > 0 || plain_doors > 0 || pitch_deg != 0)
+    return "along a path there are no laps and no other motion: no readout, depth delay, shaking, moving "
+           "objects, changes of light, curtains, doors, pitch";
+  if (path->stamps_s.empty() || path->cameras.size() < (sensor == SyntheticSensor::kStereo ? 2U : 1U))
+    return "the path has no frames, or not the cameras that the sensor needs";
   return {};
 }
 
@@ -87,7 +99,8 @@ struct SyntheticWorld::Impl {
   PinholeCamera camera;
   std::size_t frames = 0;
   Pose T_scene_first;
-  std::vector<double> parked_until;  // of each of scene.parking: way gone by the camera [m]
+  std::vector<double> parked_until;     // of each of scene.parking: way gone by the camera [m]
+  std::vector<synthetic::Lens> lenses;  // of the path's cameras
 
   static constexpr double kDuskGain = 0.3;
 
@@ -95,6 +108,7 @@ struct SyntheticWorld::Impl {
 
   // Camera in the scene's frame at a time. Smooth in time, so it may be asked between frames.
   Pose CameraAt(double t, double turned_left = 0) const {
+    if (options.path) return options.path->spline.At(t) * options.path->cameras[0].T_body_camera;
     const Pose steady = SteadyCameraAt(t, turned_left);
     return options.shake_deg_per_s > 0 ? steady * hand.At(t) : steady;
   }
@@ -122,7 +136,12 @@ struct SyntheticWorld::Impl {
     return Pose(rotation.normalized(), hills.PointAt(point, above));
   }
 
-  double StampOf(std::size_t i) const { return static_cast<double>(i) / options.rate_hz; }
+  // As the spline and the world's own drive count: from the first pose.
+  double TimeOf(std::size_t i) const {
+    if (options.path) return options.path->stamps_s[i] - options.path->spline.Begin();
+    return static_cast<double>(i) / options.rate_hz;
+  }
+  double StampOf(std::size_t i) const { return options.path ? options.path->stamps_s[i] : TimeOf(i); }
 
   // A cloud or the dusk comes within three seconds as the second lap begins: 0 before, 1 after.
   double ChangeAt(double t) const { return std::clamp((t - Way().LapTime()) / 3.0, 0.0, 1.0); }
@@ -271,7 +290,7 @@ struct SyntheticWorld::Impl {
   int BlurSamples(double t) const {
     constexpr int kLeast = 5, kMost = 199;
     constexpr double kBlurStep = 2;  // [px]
-    if (!(options.shake_deg_per_s > 0) || !(options.motion_blur_s > 0)) return kLeast;
+    if (!(options.shake_deg_per_s > 0 || options.path) || !(options.motion_blur_s > 0)) return kLeast;
     const double half = 0.5 * options.motion_blur_s;
     const Pose moved = CameraAt(std::max(t + half, 0.0)).Inverse() * CameraAt(std::max(t - half, 0.0));
     double most = 0;
@@ -291,6 +310,16 @@ struct SyntheticWorld::Impl {
     const synthetic::Shutter shutter{options.motion_blur_s, options.readout_s, BlurSamples(t)};
     return synthetic::Expose(camera, shutter, t, [&](const PinholeCamera& rows, double at) {
       return ViewFrom(rows, CameraAt(std::max(at, 0.0), turned_left), at, right_m);
+    });
+  }
+
+  // The same through the lens of one of the path's cameras.
+  synthetic::Rendering ViewAlongPath(double t, std::size_t which) const {
+    const synthetic::GivenPath& path = *options.path;
+    const synthetic::Shutter shutter{options.motion_blur_s, 0, BlurSamples(t)};
+    return synthetic::Expose(camera, shutter, t, [&](const PinholeCamera&, double at) {
+      return lenses[which].See(scene.faces, scene.textures,
+                               path.spline.At(at) * path.cameras[which].T_body_camera, Light());
     });
   }
 
@@ -316,7 +345,7 @@ struct SyntheticWorld::Impl {
     SyntheticFrame frame;
     frame.stamp_s = StampOf(i);
     frame.T_world_camera = T_world_camera;
-    const double dusk = options.dusk ? ChangeAt(frame.stamp_s) : 0;
+    const double dusk = options.dusk ? ChangeAt(TimeOf(i)) : 0;
     frame.image = Sense(left.image, 2 * i, dusk);
     if (!right.empty()) frame.right = Sense(right, 2 * i + 1, dusk);
     if (options.sensor == SyntheticSensor::kRgbd) {
@@ -359,6 +388,10 @@ SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) {
   if (!problem.empty()) throw InputError("synthetic world: " + problem);
   impl_ = std::make_unique<Impl>(options.Resolved());
   const SyntheticOptions& o = impl_->options;
+  if (o.path) {
+    SetUpPath();
+    return;
+  }
   impl_->scene = o.scene == SyntheticScene::kTown   ? synthetic::BuildTown(o)
                  : o.scene == SyntheticScene::kRoom ? synthetic::BuildRoom(o)
                                                     : synthetic::BuildCorridor(o);
@@ -378,6 +411,22 @@ SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) {
   impl_->T_scene_first = impl_->CameraAt(0);
 }
 
+void SyntheticWorld::SetUpPath() {
+  const SyntheticOptions& o = impl_->options;
+  constexpr double kStep = 0.05;  // [s]
+  std::vector<Eigen::Vector3d> way;
+  for (double t = 0; t <= o.path->spline.Length(); t += kStep) {
+    for (const synthetic::MountedCamera& c : o.path->cameras)
+      way.push_back((o.path->spline.At(t) * c.T_body_camera).translation);
+  }
+  impl_->scene = synthetic::BuildSpaceAround(o, way);
+  for (const synthetic::MountedCamera& c : o.path->cameras)
+    impl_->lenses.emplace_back(c.camera, o.supersample);
+  impl_->camera = o.path->cameras[0].camera;
+  impl_->frames = o.path->stamps_s.size();
+  if (o.frames > 0) impl_->frames = std::min(impl_->frames, static_cast<std::size_t>(o.frames));
+}
+
 SyntheticWorld::~SyntheticWorld() = default;
 SyntheticWorld::SyntheticWorld(SyntheticWorld&&) noexcept = default;
 
@@ -390,7 +439,9 @@ std::size_t SyntheticWorld::FramesPerLap() const {
   return static_cast<std::size_t>(impl_->Way().LapTime() * impl_->options.rate_hz);
 }
 
-Pose SyntheticWorld::PoseOf(std::size_t i) const { return i == 0 ? Pose() : PoseAt(Stamp(i)); }
+Pose SyntheticWorld::PoseOf(std::size_t i) const {
+  return i == 0 && !impl_->options.path ? Pose() : PoseAt(impl_->TimeOf(i));
+}
 
 Pose SyntheticWorld::PoseAt(double time_s) const {
   return impl_->T_scene_first.Inverse() * impl_->CameraAt(std::max(time_s, 0.0));
@@ -404,6 +455,12 @@ Trajectory SyntheticWorld::GroundTruth() const {
 
 SyntheticFrame SyntheticWorld::Render(std::size_t i) const {
   const SyntheticOptions& o = impl_->options;
+  if (o.path) {
+    const double at = impl_->TimeOf(i);
+    const bool stereo = o.sensor == SyntheticSensor::kStereo;
+    return impl_->Frame(i, PoseOf(i), impl_->ViewAlongPath(at, 0),
+                        stereo ? impl_->ViewAlongPath(at, 1).image : cv::Mat());
+  }
   const double t = Stamp(i);
   const double side = o.sensor == SyntheticSensor::kSides ? o.sides_deg * M_PI / 180 : 0.0;
   const synthetic::Rendering left = impl_->View(t, 0, side);
@@ -434,7 +491,8 @@ std::vector<synthetic::Face> StillFaces(const SyntheticWorld& world) {
 }
 
 cv::Mat SyntheticWorld::ExactDepth(std::size_t i) const {
-  const double t = Stamp(i);
+  const double t = impl_->TimeOf(i);
+  if (impl_->options.path) return impl_->ViewAlongPath(t, 0).depth_m;
   return impl_->ViewFrom(impl_->camera, impl_->CameraAt(t), t, 0).depth_m;
 }
 

@@ -25,7 +25,7 @@ struct SyntheticFrame {
   cv::Mat right;    ///< stereo and sides: CV_8UC1; else empty
   cv::Mat depth_m;  ///< RGB-D: CV_32FC1, z [m], 0 = not measured; else empty
   /// Left camera (sides: one between the two) at the middle of the exposure (rolling shutter: of the middle
-  /// row); world = that of frame 0.
+  /// row); world = that of frame 0, or of the path.
   Pose T_world_camera;
 };
 
@@ -39,11 +39,13 @@ class SyntheticWorld {
   SyntheticWorld(SyntheticWorld&&) noexcept;
 
   const SyntheticOptions& Options() const;  ///< resolved: without zeros that mean "default"
-  const PinholeCamera& Camera() const;  ///< of the left image; the right camera is baseline_m along its +x
+  /// Of the left image; the right camera is baseline_m along its +x, unless a path says where it is.
+  const PinholeCamera& Camera() const;
   std::size_t Size() const;
   double Stamp(std::size_t i) const;
   Pose PoseOf(std::size_t i) const;  ///< T_world_camera at Stamp(i)
-  /// T_world_camera at any time [s]; before 0 the camera stands still.
+  /// T_world_camera at any time [s], with a path counted from its first pose; before 0 the camera stands
+  /// still.
   Pose PoseAt(double time_s) const;
   Trajectory GroundTruth() const;
   double LapLength() const;  ///< [m]
@@ -60,6 +62,8 @@ class SyntheticWorld {
 
  private:
   friend std::vector<synthetic::Face> StillFaces(const SyntheticWorld& world);
+  void SetUpPath();
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

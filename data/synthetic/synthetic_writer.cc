@@ -14,6 +14,7 @@
 
 #include "core/replaced_file.h"
 #include "core/text_reader.h"
+#include "data/synthetic/given_path.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -48,7 +49,8 @@ void WriteImage(const fs::path& file, const cv::Mat& image) {
   internal::WriteFile(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
-constexpr const char* kImageFolders[] = {"image_0", "image_1", "images", "rgb", "depth"};
+constexpr const char* kImageFolders[] = {"image_0", "image_1",        "images",         "rgb",
+                                         "depth",   "mav0/cam0/data", "mav0/cam1/data", "mav0/depth0/data"};
 constexpr const char* kWritten = "# Written by `tutti generate`";
 
 // NumberName and StampName make such names: at least six digits, or a number with six decimals.
@@ -65,7 +67,7 @@ bool IsOwnName(const std::string& name) {
 bool IsOwnFolder(const fs::path& folder) {
   std::error_code code;
   bool recording = false;
-  for (const char* part : {"image_0", "image_1", "rgb", "depth"})
+  for (const char* part : {"image_0", "image_1", "rgb", "depth", "mav0"})
     recording = recording || fs::exists(folder / part, code);
   if (!recording) return true;
   try {
@@ -100,7 +102,8 @@ void RemoveOwn(const fs::path& folder) {
   for (const fs::path& file : stale) fs::remove(file, code);
   for (const char* part : kImageFolders) fs::remove(folder / part, code);
   for (const char* list :
-       {"config.yaml", "times.txt", "calib.txt", "poses.txt", "rgb.txt", "depth.txt", "groundtruth.txt"})
+       {"config.yaml", "times.txt", "calib.txt", "poses.txt", "rgb.txt", "depth.txt", "groundtruth.txt",
+        "mav0/imu0/data.csv", "mav0/imu0/sensor.yaml", "mav0/state_groundtruth_estimate0/data.csv"})
     fs::remove(folder / list, code);
 }
 
@@ -122,7 +125,17 @@ void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts
 }
 
 const char* SceneName(SyntheticScene scene) {
-  return scene == SyntheticScene::kTown ? "town" : scene == SyntheticScene::kRoom ? "room" : "corridor";
+  switch (scene) {
+    case SyntheticScene::kTown:
+      return "town";
+    case SyntheticScene::kRoom:
+      return "room";
+    case SyntheticScene::kHall:
+      return "hall";
+    case SyntheticScene::kCorridor:
+      break;
+  }
+  return "corridor";
 }
 
 // The file that `tutti run --config` takes.
@@ -134,16 +147,21 @@ std::string ConfigText(const SyntheticWorld& world) {
   const bool rgbd = o.sensor == SyntheticSensor::kRgbd, stereo = o.sensor == SyntheticSensor::kStereo;
   out << kWritten << ": synthetic " << SceneName(o.scene) << ", seed " << o.seed
       << ".\n# tutti run --config THIS_FILE --dataset THIS_FOLDER --out DIR\n"
-      << "dataset:\n  type: " << (rgbd ? "tum" : "kitti") << "  # layout on disk\n"
+      << "dataset:\n  type: "
+      << (o.path ? "euroc"
+          : rgbd ? "tum"
+                 : "kitti")
+      << "  # layout on disk\n"
       << "  sensor: "
       << (rgbd     ? "rgbd"
           : stereo ? "stereo"
                    : "mono")
-      << "\n"
-      << "  rate_hz: " << o.rate_hz << "  # frames per second\n";
+      << "\n";
+  if (!o.path) out << "  rate_hz: " << o.rate_hz << "  # frames per second\n";
   if (rgbd)
     out << "  depth_units_per_m: " << o.depth_units_per_m << "  # value in the depth image of one metre\n"
         << "  max_depth_m: " << o.max_depth_m << "  # nothing is measured beyond [m]\n";
+  if (o.path) return out.str();  // sensor.yaml has the cameras
   out << "camera:\n  width: " << c.width << "  # [px]\n  height: " << c.height << "\n  fx: " << c.fx
       << "  # [px]\n  fy: " << c.fy << "\n  cx: " << c.cx << "\n  cy: " << c.cy << "\n  distortion: none\n";
   if (stereo)
@@ -185,10 +203,15 @@ std::vector<std::string> ImageFolders(SyntheticSensor sensor) {
 class Writer {
  public:
   Writer(const SyntheticWorld& world, fs::path folder, const SyntheticWriteOptions& options)
-      : world_(world), folder_(std::move(folder)), options_(options), sensor_(world.Options().sensor) {}
+      : world_(world),
+        folder_(std::move(folder)),
+        options_(options),
+        sensor_(world.Options().sensor),
+        along_path_(world.Options().path != nullptr) {}
 
   std::size_t Run() {
-    PrepareFolder(folder_, ImageFolders(sensor_), options_.force);
+    PrepareFolder(folder_, along_path_ ? synthetic::EurocImageFolders(sensor_) : ImageFolders(sensor_),
+                  options_.force);
     if (sensor_ != SyntheticSensor::kSides) internal::WriteFile(folder_ / "config.yaml", ConfigText(world_));
     std::vector<std::thread> threads;
     try {
@@ -228,12 +251,11 @@ class Writer {
 
   void WriteFrame(std::size_t i) const {
     const SyntheticFrame frame = world_.Render(i);
+    if (along_path_) return WriteEurocFrame(frame);
     if (sensor_ == SyntheticSensor::kRgbd) {
       const std::string name = StampName(frame.stamp_s);
       WriteImage(folder_ / "rgb" / name, frame.image);
-      cv::Mat depth;
-      frame.depth_m.convertTo(depth, CV_16U, world_.Options().depth_units_per_m);
-      WriteImage(folder_ / "depth" / name, depth);
+      WriteImage(folder_ / "depth" / name, DepthOf(frame));
     } else if (sensor_ == SyntheticSensor::kSides) {
       WriteImage(folder_ / "images" / NumberName(2 * i + 1), frame.image);
       WriteImage(folder_ / "images" / NumberName(2 * i + 2), frame.right);
@@ -243,7 +265,22 @@ class Writer {
     }
   }
 
+  cv::Mat DepthOf(const SyntheticFrame& frame) const {
+    cv::Mat depth;
+    frame.depth_m.convertTo(depth, CV_16U, world_.Options().depth_units_per_m);
+    return depth;
+  }
+
+  void WriteEurocFrame(const SyntheticFrame& frame) const {
+    const std::vector<std::string> folders = synthetic::EurocImageFolders(sensor_);
+    const std::string name = synthetic::EurocName(frame.stamp_s);
+    WriteImage(folder_ / folders[0] / name, frame.image);
+    if (folders.size() > 1)
+      WriteImage(folder_ / folders[1] / name, frame.right.empty() ? DepthOf(frame) : frame.right);
+  }
+
   void WriteLists(std::size_t count) const {
+    if (along_path_) return synthetic::WriteEurocLists(world_, count, folder_);
     Trajectory truth = world_.GroundTruth();
     truth.resize(count);
     if (sensor_ == SyntheticSensor::kRgbd) {
@@ -268,6 +305,7 @@ class Writer {
   const fs::path folder_;
   const SyntheticWriteOptions& options_;
   const SyntheticSensor sensor_;
+  const bool along_path_;
   std::mutex mutex_;
   std::size_t next_ = 0, done_ = 0;
   std::atomic<bool> stop_{false};

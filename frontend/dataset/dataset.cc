@@ -15,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a folder holds, by the names in it alone; it looks into no folder further down than a layout has its own.
+// What a folder holds, by the names in it alone; it looks into no folder further down than a layout has its
+// own.
 std::optional<DatasetType> FolderType(const fs::path& path) {
   std::error_code code;
   const auto folder = [&](const char* name) { return fs::is_directory(path / name, code); };
@@ -287,7 +288,7 @@ std::unique_ptr<Dataset> OpenDataset(const fs::path& path, const DatasetOptions&
   }
   std::unique_ptr<Dataset> whole = OpenWhole(path, use);
   if (use.rotate != 0) whole = TurnFrames(std::move(whole), use.rotate, path.string());
-  return SelectFrames(std::move(whole), use, path.string());
+  return AddImu(SelectFrames(std::move(whole), use, path.string()), path, use);
 }
 
 }  // namespace tutti

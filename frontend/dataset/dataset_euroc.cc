@@ -5,6 +5,7 @@
 #include "core/camera_text.h"
 #include "core/time_stamps.h"
 #include "frontend/dataset/dataset_folder.h"
+#include "frontend/dataset/imu_file.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -146,12 +147,28 @@ SensorYaml ReadSensorYaml(const fs::path& file) {
   return out;
 }
 
+void ReadImuYaml(const fs::path& file, ImuBeside* imu) {
+  const YamlValues values = ReadValues(file);
+  if (values.count("data") != 0) imu->T_body_imu = ReadTransform(file, Get(file, values, "data", 16));
+  const auto read = [&](const char* key, double* value) {
+    if (values.count(key) != 0) *value = NumberAt(file, Get(file, values, key, 1), 0);
+  };
+  read("gyroscope_noise_density", &imu->calibration.gyro_noise);
+  read("gyroscope_random_walk", &imu->calibration.gyro_random_walk);
+  read("accelerometer_noise_density", &imu->calibration.acceleration_noise);
+  read("accelerometer_random_walk", &imu->calibration.acceleration_random_walk);
+}
+
 FolderContents FindEuroc(const fs::path& folder, const DatasetOptions& options) {
-  if (options.sensor == Sensor::kRgbd)
-    throw InputError(folder.string() +
-                     ": the EuRoC layout has no depth images; set sensor to stereo or mono");
   std::error_code code;
   const fs::path mav = fs::is_directory(folder / "cam0", code) ? folder : folder / "mav0";
+  const bool rgbd = options.sensor == Sensor::kRgbd;
+  const fs::path beside = mav / (rgbd ? "depth0" : "cam1");
+  if (rgbd && !fs::is_directory(beside, code))
+    throw InputError(
+        folder.string() +
+        ": EuRoC's layout has no depth images (mav0/depth0, of tutti generate, is not there); set "
+        "sensor to stereo or mono");
   FolderContents out;
   out.folder = folder;
   const SensorYaml left = ReadMounted(mav / "cam0" / "sensor.yaml");
@@ -162,11 +179,13 @@ FolderContents FindEuroc(const fs::path& folder, const DatasetOptions& options) 
   const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.stamp_unit, out.warnings, &out.skipped);
   std::vector<StampedImage> right_images;
   if (options.sensor == Sensor::kStereo) {
-    const SensorYaml right = ReadMounted(mav / "cam1" / "sensor.yaml");
+    const SensorYaml right = ReadMounted(beside / "sensor.yaml");
     out.rig.right = right.camera;
     out.rig.T_right_left = right.T_body_sensor->Inverse() * *left.T_body_sensor;
+  }
+  if (options.sensor != Sensor::kMono) {
     StampUnit unit = out.stamp_unit;
-    right_images = ReadCsv(mav / "cam1", unit, out.warnings, nullptr);
+    right_images = ReadCsv(beside, unit, out.warnings, nullptr);
   }
   std::size_t alone = 0;
   for (const StampedImage& image : images) {
@@ -178,12 +197,14 @@ FolderContents FindEuroc(const fs::path& folder, const DatasetOptions& options) 
     if (at == right_images.end() || at->stamp_ns > image.stamp_ns + kSamePairNs)
       ++alone;
     else
-      frame.right = at->file;
+      (rgbd ? frame.depth : frame.right) = at->file;
     out.frames.push_back(std::move(frame));
   }
-  if (options.sensor == Sensor::kStereo)
-    out.ReportAlone(mav / "cam1" / "data.csv", alone, "no image has the time stamp of an image of cam0",
-                    "left images have no right image and are tracked without", options);
+  if (options.sensor != Sensor::kMono)
+    out.ReportAlone(beside / "data.csv", alone, "no image has the time stamp of an image of cam0",
+                    rgbd ? "images have no depth image and are tracked without"
+                         : "left images have no right image and are tracked without",
+                    options);
   out.truth_places = {folder / "groundtruth_tum.txt", folder / "groundtruth.txt",
                       mav / "state_groundtruth_estimate0" / "data.csv",
                       mav.parent_path() / "groundtruth_tum.txt"};

@@ -10,32 +10,6 @@
 namespace tutti {
 namespace {
 
-/// Gives what another data set gives.
-class WrappedDataset : public Dataset {
- public:
-  Supply FrameSupply() const override { return whole_->FrameSupply(); }
-  bool WaitFor(std::size_t i, const std::function<bool()>& stop) const override {
-    return whole_->WaitFor(i, stop);
-  }
-  std::size_t Size() const override { return whole_->Size(); }
-  double Stamp(std::size_t i) const override { return whole_->Stamp(i); }
-  std::int64_t Number(std::size_t i) const override { return whole_->Number(i); }
-  double SkippedShare() const override { return whole_->SkippedShare(); }
-  const CameraRig& Rig() const override { return rig_; }
-  std::optional<std::filesystem::path> GroundTruthFile() const override { return whole_->GroundTruthFile(); }
-  Trajectory ReadGroundTruth(const std::filesystem::path& file,
-                             std::vector<std::string>* warnings) const override {
-    return whole_->ReadGroundTruth(file, warnings);
-  }
-  const std::vector<std::string>& Warnings() const override { return whole_->Warnings(); }
-
- protected:
-  explicit WrappedDataset(std::unique_ptr<Dataset> whole) : whole_(std::move(whole)), rig_(whole_->Rig()) {}
-
-  std::unique_ptr<Dataset> whole_;
-  CameraRig rig_;
-};
-
 // Drawn anew for each frame, so that it is the same whatever was read before, and by which thread.
 void AddNoise(double sigma, std::uint64_t seed, cv::Mat& image) {
   if (image.empty()) return;
@@ -78,7 +52,6 @@ class SelectedDataset : public WrappedDataset {
     return read;
   }
   ColourImage ReadColour(std::size_t i) const override { return whole_->ReadColour(Place(i)); }
-  int TurnedBy() const override { return whole_->TurnedBy(); }
 
  private:
   std::size_t Place(std::size_t i) const { return start_ + i * stride_; }  // in whole_

@@ -1,5 +1,6 @@
 #include "frontend/odometry/frame_check.h"
 
+#include <cmath>
 #include <string>
 
 #include "frontend/dataset/image_file.h"
@@ -17,6 +18,10 @@ void CheckFrame(const InputFrame& frame, const CameraRig& rig) {
     if (image.size() != size)
       refuse(field, "must have " + SizeText(size) + " pixels, and has " + SizeText(image.size()));
   };
+  for (const ImuSample& sample : frame.imu) {
+    if (!std::isfinite(sample.stamp_s) || !sample.gyro.allFinite() || !sample.acceleration.allFinite())
+      refuse("imu", "has a number that is not finite");
+  }
   if (frame.image.empty() && frame.image.dims <= 2) {
     if (!frame.features) refuse("image", "is empty");
     return;

@@ -6,6 +6,7 @@
 #include "core/numbers.h"
 #include "frontend/map/bundle_adjustment.h"
 #include "frontend/map/matcher.h"
+#include "frontend/odometry/rolling_start.h"
 
 namespace tutti {
 namespace {
@@ -45,12 +46,24 @@ void MonoInitializer::KeepAsReference(const TrackedFrame& frame) {
   for (const cv::KeyPoint& k : frame.features->keypoints) references_.back().centres.push_back(k.pt);
 }
 
-bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
+// A rolling shutter bends a view by how the camera turns in it: as if all rows were read with the middle one.
+TrackedFrame MonoInitializer::Straight(const TrackedFrame& frame) const {
+  const RollingShutter shutter(rig_);
+  if (!shutter.Rolls()) return frame;
+  const std::optional<Vector6d> turn = TurnIn(rig_.camera, pending_, frame);
+  if (!turn) return frame;
+  TrackedFrame straight = frame;
+  straight.features = shutter.Straighten(*frame.features, *turn, 1);
+  return straight;
+}
+
+bool MonoInitializer::Offer(const TrackedFrame& seen, int piece, const Pose& T_world_camera,
                             double median_depth, Map* map, std::string* reason) {
+  const TrackedFrame frame = Straight(seen);
   const auto wait = [&](const std::string& why) {
     *reason = why;
-    pending_.push_back(frame);
-    pending_.back().features = WithoutImages(*frame.features);
+    pending_.push_back(seen);
+    pending_.back().features = WithoutImages(*seen.features);
     if (pending_.size() > kMaxPending) pending_.erase(pending_.begin());
     return false;
   };

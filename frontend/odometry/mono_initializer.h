@@ -49,6 +49,7 @@ class MonoInitializer {
     }
   };
   using Matches = std::vector<std::pair<int, int>>;
+  TrackedFrame Straight(const TrackedFrame& frame) const;
   Matches FollowReferences(const TrackedFrame& frame);
   void KeepAsReference(const TrackedFrame& frame);
   void AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera, double median_depth,

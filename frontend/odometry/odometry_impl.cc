@@ -11,6 +11,7 @@
 #include "frontend/map/measured.h"
 #include "frontend/map/move_keyframes.h"
 #include "frontend/map/scale_ramp.h"
+#include "frontend/odometry/step_check.h"
 
 namespace tutti {
 namespace {
@@ -31,6 +32,7 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       tracker_(options, rig),
       rolling_start_(rig),
       clocks_(rig, options),
+      imu_(rig.imu.value_or(ImuCalibration())),
       relocalizer_(options, rig),
       follower_(options, rig),
       localizer_(options, rig),
@@ -50,6 +52,7 @@ void Odometry::Impl::GoOn(const Impl& before, Map map, std::int64_t frame_offset
 TrackResult Odometry::Impl::Track(const InputFrame& input) {
   mapper_.NextFrame();
   if (mapper_.Due()) EnterMapping();
+  imu_.Add(input.imu);
   if (tracker_.state() == TrackingState::kInitializing) {
     const TrackedFrame frame = Prepare(input, options_.features);
     result_ = Initialize(frame);
@@ -57,14 +60,21 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
     return result_;
   }
   const Pose T_last_world = last().T_camera_world;
-  const double last_stamp_s = last().frame.stamp_s;
+  const double last_stamp_s = last().frame.stamp_s, last_s = last().frame.Time();
   const auto [frame, tracked] = Look(input);
+  if (tracked.fix) CompareTurn(T_last_world, last_s, *tracked.fix);
   if (tracked.fix && keeps_height_)
     height_.See(rig_.camera, frame.features, last().T_camera_world, T_last_world,
                 map().MedianDepth(last().reference), last().frame.stamp_s - last_stamp_s);
   result_ = TrackMap(frame, tracked);
   result_.features = static_cast<int>(frame.features->size());
   return result_;
+}
+
+// The camera's turn from the frame before, as landmarks say, with that of the IMU.
+void Odometry::Impl::CompareTurn(const Pose& T_last_world, double last_s, const PoseFix& fix) {
+  if (imu_.empty() || fix.by_grey) return;
+  imu_.AddStep(last_s, fix.frame.Time(), T_last_world.rotation * fix.T_camera_world.rotation.conjugate());
 }
 
 // With as many features as the pose needs; where those leave a doubt, once more with all. One camera has
@@ -167,6 +177,7 @@ TrackResult Odometry::Impl::FollowFirst(const TrackedFrame& frame, const Pose& T
 
 TrackedFrame Odometry::Impl::Prepare(const InputFrame& input, int features) {
   TrackedFrame frame{input.index + frame_offset_, input.stamp_s, input.features, input.clock_s};
+  if (!imu_.empty() && last().reference >= 0) frame.turn = imu_.CameraTurn(last().frame.Time(), frame.Time());
   if (!frame.features) {
     const ScopedStopwatch watch(&stages_, Lane::kTracking, "extract");
     OdometryOptions options = options_;
@@ -195,7 +206,9 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
     if (IsLater(earlier.stamp_s)) AddFrame(earlier, T_camera_world, start.before_reference);
   }
   const tutti::Keyframe& keyframe = map().keyframe(start.keyframe);
-  tracker_.Begin(frame, keyframe);
+  TrackedFrame begun = frame;
+  begun.features = keyframe.features;  // straightened, if its rows were read one after the other
+  tracker_.Begin(begun, keyframe);
   height_.Forget();
   relocalizer_.Found();
   relocalizer_.TakeLost();
@@ -288,6 +301,7 @@ OdometryReport Odometry::Impl::Report() const {
   if (mapper_.lens().Enabled()) report.lens = mapper_.lens().Found();
   report.height = height_.Found();
   report.clocks = clocks_.Found();
+  if (!imu_.empty()) report.imu = imu_.report();
   return report;
 }
 
@@ -328,6 +342,11 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked, bool goes_on
   if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
   const LastFrame& last = tracker_.last();
   AddFrame(last.frame, last.T_camera_world, last.reference, goes_on);
+  if (result.keyframe >= 0 && rig_.sensor == Sensor::kMono && !localizer_.Begun() &&
+      ImagesContradict(map(), rig_.camera, result.keyframe, options_.min_inliers)) {
+    tracker_.GiveUp();  // a loop closure may join what follows
+    initializer_.NextPiece({});
+  }
   result.T_world_camera = last.T_camera_world.Inverse();
   if (localizer_.Beyond()) relocalizer_.Wait(last.frame);
   return result;
@@ -336,7 +355,8 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked, bool goes_on
 // The frames that were lost before the one that has just been found, backwards from there: a camera that
 // comes back from a bare wall sees more and more of what it found again.
 void Odometry::Impl::TrackLost() {
-  const std::vector<TrackedFrame> lost = relocalizer_.TakeLost();
+  std::vector<TrackedFrame> lost = relocalizer_.TakeLost();
+  for (TrackedFrame& frame : lost) frame.turn.reset();  // it was from the other side
   if (localizer_.Begun()) return;
   Tracker backwards = tracker_;
   std::vector<LastFrame> found;

@@ -9,6 +9,7 @@
 
 #include "core/section_file.h"
 #include "core/stopwatch.h"
+#include "frontend/imu/imu_examination.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/camera_height.h"
 #include "frontend/odometry/clock_estimate.h"
@@ -86,6 +87,7 @@ class Odometry::Impl {
   TrackResult Initialize(const TrackedFrame& frame);
   TrackResult FollowFirst(const TrackedFrame& frame, const Pose& T_odom_camera);
   TrackResult TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked);
+  void CompareTurn(const Pose& T_last_world, double last_s, const PoseFix& fix);
   TrackResult Accept(const Tracker::Tracked& tracked, bool goes_on);
   void TrackLost();
   bool BecomesKeyframe(const Tracker::Tracked& tracked) const;
@@ -104,6 +106,7 @@ class Odometry::Impl {
   Tracker tracker_;
   RollingStart rolling_start_;
   ClockEstimate clocks_;
+  ImuExamination imu_;
   Relocalizer relocalizer_;
   PoseFollower follower_;
   Localizer localizer_;

@@ -46,13 +46,22 @@ std::map<int, int> Votes(const Map& map, const std::vector<int>& landmarks) {
   return votes;
 }
 
-// Where the camera may be, likeliest first: it went on as before, or stopped.
-std::vector<Pose> Predictions(const LastFrame& last, double time_s) {
+// Where the camera may be, likeliest first: it went on as before, or stopped, or turned as an IMU says. After
+// lost frames the IMU comes first. Before that it comes last: where the motion leads, images are found
+// without it, and sharp recordings were worse (1.4 times the ATE on two rendered flights) when it came first.
+std::vector<Pose> Predictions(const LastFrame& last, const TrackedFrame& frame, bool lost) {
   std::vector<Pose> predictions;
-  const double since = time_s - last.frame.Time();
+  const double since = frame.Time() - last.frame.Time();
+  const auto by_imu = [&] {
+    if (!frame.turn) return;
+    predictions.push_back(last.After(std::min(since, kVelocityHolds), *frame.turn));
+    if (since > kSurePrediction) predictions.push_back(last.After(0, *frame.turn));
+  };
+  if (lost) by_imu();
   if (last.velocity) predictions.push_back(last.After(std::min(since, kVelocityHolds)));
   if (last.velocity && since > kSurePrediction) predictions.push_back(last.After(kSurePrediction));
   predictions.push_back(last.T_camera_world);
+  if (!lost) by_imu();
   return predictions;
 }
 
@@ -91,10 +100,10 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
   Contest contest{map, lost ? 2 * options_.min_inliers : options_.min_inliers, depth,
                   last.steady ? ReachOf(last, frame.Time(), depth, rig_.sensor) : std::nullopt};
   const float base = rig_.sensor == Sensor::kStereo ? 8.0F : 15.0F;
-  const std::vector<Pose> predictions = Predictions(last, frame.Time());
+  const std::vector<Pose> predictions = Predictions(last, frame, lost);
   // Corners near a place may all be those of the next of equal windows, and one camera measures no depths
   // that say so. What is alike just where the motion leads is the right window.
-  if (rig_.sensor == Sensor::kMono && last.velocity &&
+  if (rig_.sensor == Sensor::kMono && (last.velocity || (lost && frame.turn)) &&
       Offer(GuessFromPatches(map, frame, last, predictions.front()), &contest))
     return contest.best;
   for (const Pose& prediction : predictions) {

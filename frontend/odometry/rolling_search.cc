@@ -58,6 +58,8 @@ RollingSearch::Expected RollingSearch::Expect(const Map& map, const TrackedFrame
   expected.depth = depth > 0 ? depth : kUnknownDepth;
   const bool known = last.velocity && dt > 0 && dt < kMotionHolds;
   if (known) expected.camera.motion = *last.velocity;
+  const bool turned = frame.turn && dt > 0 && dt < kMotionHolds;
+  if (turned) expected.camera.motion.tail<3>() = LogSO3(*frame.turn) / dt;
   expected.camera.T_camera_world = ExpSE3(expected.camera.motion * dt) * last.T_camera_world;
   const Vector6d next = last.motion + dt * last.change;  // of a camera that goes on changing its motion
   for (const Vector6d& motion : {expected.camera.motion, next})

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "frontend/geometry/rolling_shutter.h"
 #include "frontend/odometry/tracked_frame.h"
@@ -32,5 +33,15 @@ class RollingStart {
   RollingShutter shutter_;
   bool depth_;
 };
+
+/// One camera has no pose in its first frames, but how it turns there bends them by more than it moves. Its
+/// turn from one of these frames to the next, by what both see: the mean motion between them, of
+/// T_camera_world, per second. None: they are too far apart in time, or have too little in common.
+std::optional<Vector6d> TurnBetween(const PinholeCamera& camera, const TrackedFrame& before,
+                                    const TrackedFrame& after);
+/// How it turns in `frame`, if it goes on changing its turn as in `before` (frames as their images have them,
+/// oldest first; the last two count).
+std::optional<Vector6d> TurnIn(const PinholeCamera& camera, const std::vector<TrackedFrame>& before,
+                               const TrackedFrame& frame);
 
 }  // namespace tutti

@@ -1,9 +1,12 @@
 #include "frontend/odometry/step_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <opencv2/features2d.hpp>
 
 #include "core/dense_solvers.h"
+#include "frontend/geometry/two_view.h"
 #include "frontend/map/measured.h"
 
 namespace tutti {
@@ -12,6 +15,13 @@ namespace {
 constexpr int kFewestPoints = 30;
 constexpr double kFewestShare = 0.5;  // of the points that both see
 constexpr double kVariances = 4;      // points of one image share their errors
+constexpr int kWatched = 12;          // keyframes after a thin one, or after a submap's first
+constexpr int kThin = 3;              // times the fewest inliers of a pose: landmarks of a thin keyframe
+constexpr std::array<int, 2> kBack = {2, 4};  // keyframes that a new one is compared with
+constexpr float kAlike = 50;                  // bits
+constexpr double kOnLine = 2;                 // distance from an epipolar line [px]
+constexpr int kLeastAgreeing = 120;           // matches that an essential matrix fits, of both pairs
+constexpr double kLeastByMap = 0.65;          // of them, that the map's poses fit
 
 // The keyframe's feature that sees a landmark; -1: none.
 int FeatureOf(const Landmark& landmark, int keyframe) {
@@ -53,7 +63,77 @@ bool Sigmas(const PinholeCamera& camera, const std::vector<PointObservation>& po
   return true;
 }
 
+// The newest keyframes of a keyframe's submap, itself first; at most kWatched.
+std::vector<int> Watched(const Map& map, int keyframe) {
+  std::vector<int> newest;
+  for (int id = keyframe; id >= 0 && static_cast<int>(newest.size()) < kWatched; --id) {
+    const Keyframe& k = map.keyframe(id);
+    if (k.piece == map.keyframe(keyframe).piece && k.replaced_by < 0) newest.push_back(id);
+  }
+  return newest;
+}
+
+// Few landmarks held its pose: those that were there before it.
+bool IsThin(const Map& map, const Keyframe& keyframe, int min_inliers) {
+  const auto held = std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(), [&](int landmark) {
+    return landmark >= 0 && map.landmark(landmark).reference < keyframe.id;
+  });
+  return held < kThin * min_inliers;
+}
+
+// The first two coordinates of rays (x/z, y/z, 1) to what two keyframes see, by their descriptors alone.
+struct RayPairs {
+  RayPairs(const PinholeCamera& camera, const FrameFeatures& a, const FrameFeatures& b) {
+    if (a.size() == 0 || b.size() == 0) return;
+    std::vector<cv::DMatch> mutual;
+    cv::BFMatcher(cv::NORM_HAMMING, true).match(a.descriptors, b.descriptors, mutual);
+    const auto ray = [&camera](const FrameFeatures& features, int f) {
+      const cv::Point2f p = features.keypoints[static_cast<std::size_t>(f)].pt;
+      return Eigen::Vector2d(camera.Unproject({p.x, p.y}).head<2>());
+    };
+    for (const cv::DMatch& match : mutual) {
+      if (match.distance > kAlike) continue;
+      first.push_back(ray(a, match.queryIdx));
+      second.push_back(ray(b, match.trainIdx));
+    }
+  }
+
+  // Whose Sampson distance is within the bound.
+  int Agreeing(const Eigen::Matrix3d& essential, double bound) const {
+    int count = 0;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      const Eigen::Vector3d a = first[i].homogeneous(), b = second[i].homogeneous();
+      const Eigen::Vector3d of_a = essential * a, of_b = essential.transpose() * b;
+      const double e = b.dot(of_a);
+      count += e * e < bound * bound * (of_a.head<2>().squaredNorm() + of_b.head<2>().squaredNorm()) ? 1 : 0;
+    }
+    return count;
+  }
+
+  std::vector<Eigen::Vector2d> first, second;
+};
+
 }  // namespace
+
+bool ImagesContradict(const Map& map, const PinholeCamera& camera, int keyframe, int min_inliers) {
+  const std::vector<int> newest = Watched(map, keyframe);
+  const bool begins = static_cast<int>(newest.size()) < kWatched;
+  const auto thin = [&](int id) { return IsThin(map, map.keyframe(id), min_inliers); };
+  if (!begins && std::none_of(newest.begin(), newest.end(), thin)) return false;
+  const double bound = kOnLine / (0.5 * (camera.fx + camera.fy));
+  int by_map = 0, by_images = 0;
+  for (const int back : kBack) {
+    if (back >= static_cast<int>(newest.size())) break;
+    const Keyframe &from = map.keyframe(newest[static_cast<std::size_t>(back)]), &to = map.keyframe(keyframe);
+    const RayPairs pairs(camera, *from.features, *to.features);
+    const auto fit = internal::FitEssential(pairs.first, pairs.second, bound, 0.999);
+    if (!fit) continue;
+    const Pose T_to_from = to.T_world_camera.Inverse() * from.T_world_camera;
+    by_images += pairs.Agreeing(fit->matrix, bound);
+    by_map += pairs.Agreeing(Skew(T_to_from.translation) * T_to_from.rotation.toRotationMatrix(), bound);
+  }
+  return by_images >= kLeastAgreeing && by_map < kLeastByMap * by_images;
+}
 
 std::optional<StepCheck> CheckStep(const Map& map, const CameraRig& rig, const OdometryOptions& options,
                                    int keyframe, const FrameFeatures& features,

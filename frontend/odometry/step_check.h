@@ -1,4 +1,5 @@
-// What two images say of the step that another odometry measured between them.
+// What images say of steps: of those that another odometry measured, and of those that one camera made with
+// few landmarks.
 #pragma once
 
 #include <optional>
@@ -19,5 +20,12 @@ std::optional<StepCheck> CheckStep(const Map& map, const CameraRig& rig, const O
                                    int keyframe, const FrameFeatures& features,
                                    const std::vector<int>& landmarks, const Pose& T_camera_world,
                                    const Pose& T_seen_world);
+
+/// One camera. Whether images contradict the map where it was thin not long before a keyframe, or began
+/// there. Few landmarks can hold a wrong pose; what is triangulated from it agrees with it and holds the next
+/// one, a world that gets smaller and smaller as the camera moves on. Matches that no landmark has chosen
+/// don't agree with it: the essential matrix that fits them has many more inliers than the one of the map's
+/// poses. False where the map was not thin, or images say nothing.
+bool ImagesContradict(const Map& map, const PinholeCamera& camera, int keyframe, int min_inliers);
 
 }  // namespace tutti

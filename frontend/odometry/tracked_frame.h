@@ -20,6 +20,9 @@ struct TrackedFrame {
   double stamp_s = 0;
   std::shared_ptr<const FrameFeatures> features;
   double clock_s = 0;  ///< InputFrame::clock_s
+  /// By an IMU: from the axes of the camera in the last frame with a pose to those in this one. Of no use any
+  /// more once the frame is tracked, and not saved.
+  std::optional<Eigen::Quaterniond> turn = {};
 
   /// For motions; the stamp is for what others compare frames with.
   double Time() const { return stamp_s + clock_s; }
@@ -77,6 +80,14 @@ struct LastFrame {
 
   /// T_camera_world after so many seconds more of its velocity, which it must have.
   Pose After(double seconds) const { return ExpSE3(*velocity * seconds) * T_camera_world; }
+  /// The same with a rotation that an IMU measured meanwhile: the camera's centre goes on straight ahead, or
+  /// without a velocity stays.
+  Pose After(double seconds, const Eigen::Quaterniond& turn) const {
+    Eigen::Vector3d center = T_camera_world.Inverse().translation;
+    if (velocity) center -= seconds * (T_camera_world.rotation.conjugate() * velocity->head<3>());
+    const Eigen::Quaterniond rotation = turn * T_camera_world.rotation;
+    return Pose(rotation, -(rotation * center));
+  }
 
   template <class Archive>
   void State(Archive& archive) {

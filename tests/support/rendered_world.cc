@@ -8,6 +8,7 @@
 
 #include "core/byte_stream.h"
 #include "tests/support/made_once.h"
+#include "tutti/core/error.h"
 
 namespace tutti::testing {
 namespace {
@@ -47,11 +48,12 @@ cv::Mat GetImage(internal::ByteReader& in) {
 std::string TextOf(const SyntheticOptions& options) {
   // All of them: with another number of names this does not compile.
   const auto& [seed, scene, sensor, width, height, focal_px, baseline_m, sides_deg, pitch_deg, rate_hz,
-               max_depth_m, depth_units_per_m, laps, frames, speed_mps, blocks_x, blocks_y, block_m, street_m,
-               repeat_fraction, facades, sign_fraction, road_surfaces, hills_m, bare_fraction, plain_doors,
-               corridor_m, noise_sigma, motion_blur_s, readout_s, depth_delay_s, shake_deg_per_s,
+               max_depth_m, depth_units_per_m, path, laps, frames, speed_mps, blocks_x, blocks_y, block_m,
+               street_m, repeat_fraction, facades, sign_fraction, road_surfaces, hills_m, bare_fraction,
+               plain_doors, corridor_m, noise_sigma, motion_blur_s, readout_s, depth_delay_s, shake_deg_per_s,
                lighting_change, dusk, other_cars, occlusion, moving_objects, kinect_noise, supersample] =
       options;
+  if (path) throw InputError("frames along a path are not kept");
   std::ostringstream text;
   text.precision(17);
   const auto put = [&text](const auto&... values) { ((text << values << ' '), ...); };

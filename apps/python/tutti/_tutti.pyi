@@ -266,6 +266,7 @@ class Dataset:
                  depth_units_per_m: float = 0, max_depth_m: float = 0, max_association_s: float = 0.02,
                  rate_hz: float = 0, topic: str = '', right_topic: str = '', depth_topic: str = '', follow_s: float = 0,
                  start: int = 0, end: int = 0, stride: int = 1, mask: str = '', rotate: int = 0,
+                 imu: bool = True,
                  noise: float = 0, noise_draw: int = 0,
                  mirrored_ground_truth: bool = False) -> None: ...
     def __iter__(self) -> FrameIterator: ...

@@ -1,4 +1,5 @@
 #include "frontend/map/bundle_adjustment.h"
+#include "frontend/features/features.h"
 
 #include <gtest/gtest.h>
 

@@ -26,7 +26,7 @@ using testing::kLoop;
 using testing::kStateFile;
 using testing::RideOf;
 using testing::Rider;
-using testing::Section;
+using testing::SavedSection;
 using testing::Sections;
 using testing::SectionsOf;
 
@@ -68,7 +68,7 @@ TEST_F(DamagedOdometryState, UndamagedItIsTaken) {
 
 TEST_F(DamagedOdometryState, CutOffBeforeOrWithinASectionItIsRefused) {
   std::size_t at = 16;  // magic, version, byte order
-  for (const Section& section : sections_) {
+  for (const SavedSection& section : sections_) {
     internal::SectionHeader header;
     std::memcpy(&header, bytes_.data() + at, sizeof header);
     const std::size_t content = at + sizeof header;
@@ -114,7 +114,7 @@ TEST_F(DamagedOdometryState, WrongNumbersWithRightChecksumsAreRefusedOrHarmless)
   int refused = 0, taken = 0;
   for (int i = 0; i < 200; ++i) {
     Sections damaged = sections_;
-    Section& section = damaged[random() % damaged.size()];
+    SavedSection& section = damaged[random() % damaged.size()];
     if (section.bytes.size() < 8) continue;
     const std::uint32_t values[] = {
         0xffffffff, 0x7fffffff, 0x80000000, 0x7fc00000, 1000000, 3, std::uint32_t(random())};
@@ -145,7 +145,7 @@ TEST_F(DamagedOdometryState, WrongNumbersWithRightChecksumsAreRefusedOrHarmless)
 template <class T>
 Sections WithValue(Sections sections, std::uint32_t tag, std::size_t at, T value) {
   const auto section =
-      std::find_if(sections.begin(), sections.end(), [&](const Section& s) { return s.tag == tag; });
+      std::find_if(sections.begin(), sections.end(), [&](const SavedSection& s) { return s.tag == tag; });
   std::memcpy(&section->bytes.at(at), &value, sizeof value);
   return sections;
 }
@@ -156,7 +156,7 @@ TEST_F(DamagedOdometryState, WrongNumbersAreCalledByTheirName) {
   testing::WriteSections(file_, WithValue(sections_, kKeyframe, 28, std::nan("")));
   ExpectRefused("a rotation that is none");
   const auto landmarks = std::find_if(sections_.begin(), sections_.end(),
-                                      [](const Section& section) { return section.tag == kLandmarks; });
+                                      [](const SavedSection& section) { return section.tag == kLandmarks; });
   std::size_t alive = 0;
   while (landmarks->bytes.at(alive) == 0) alive += 1 + sizeof(int);  // a dead one: what replaced it
   testing::WriteSections(file_, WithValue(sections_, kLandmarks, alive + 1, std::nan("")));

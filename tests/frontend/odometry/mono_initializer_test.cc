@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "frontend/geometry/rolling_shutter.h"
 #include "tests/frontend/odometry/tracked_scene.h"
 
 namespace tutti {
@@ -86,6 +89,35 @@ TEST_F(MonoInitializerTest, KeepsTheFramesThatWait) {
     EXPECT_FALSE(initializer.Offer(Frame(Moved(0.05 * i, 0), 0.1 * i), 0, Pose(), 1, &map, &reason_));
   EXPECT_EQ(initializer.pending().size(), 3);
   EXPECT_TRUE(initializer.Offer(Frame(Moved(0.6, 0), 0.3), 0, Pose(), 1, &map, &reason_)) << reason_;
+}
+
+// A hand shakes a camera that moves to the side: rows that are read later see a camera that has turned on.
+TEST_F(MonoInitializerTest, ViewsOfARollingShutterAreStraightenedByHowItTurns) {
+  CameraRig rig = Rig();
+  rig.readout_s = 0.03;
+  const RollingShutter shutter(rig);
+  const auto pose = [](double t) { return Moved(0.5 * t, 0, 0.2 * std::sin(2 * M_PI * t)); };
+  MonoInitializer initializer(OdometryOptions(), rig);
+  bool started = false;
+  for (int i = 0; i < 40 && !started; ++i) {
+    const double t = i / 20.0, turn = -0.2 * 2 * M_PI * std::cos(2 * M_PI * t);  // of T_camera_world
+    TrackedFrame frame = Frame(pose(t), t);
+    auto rolled = std::make_shared<FrameFeatures>(*frame.features);
+    for (cv::KeyPoint& k : rolled->keypoints) {
+      const Eigen::Vector3d ray = rig.camera.Unproject({k.pt.x, k.pt.y});
+      const Eigen::Vector2d pixel = rig.camera.Project(ExpSO3({0, turn * shutter.TimeOf(k.pt.y), 0}) * ray);
+      k.pt.x = static_cast<float>(pixel.x());
+      k.pt.y = static_cast<float>(pixel.y());
+    }
+    rolled->BuildGrid(rig.camera.width, rig.camera.height);
+    frame.features = rolled;
+    started = initializer.Offer(frame, 0, Pose(), 1, &map_made_, &reason_);
+  }
+  ASSERT_TRUE(started) << reason_;
+  const Pose is = map_made_.keyframe(1).T_world_camera,
+             should = pose(map_made_.keyframe(0).stamp_s).Inverse() * pose(map_made_.keyframe(1).stamp_s);
+  EXPECT_GT(is.translation.normalized().dot(should.translation.normalized()), 0.998);
+  EXPECT_LT(LogSO3(is.rotation.conjugate() * should.rotation).norm(), 0.005);
 }
 
 }  // namespace

@@ -25,12 +25,12 @@ constexpr internal::SectionFileKind kStateFile = {
     {'T', 'E', 'S', 'T', 'O', 'D', 'O', '\n'}, 1, "test", "a test"};
 constexpr std::uint32_t kKeyframe = 101, kLandmarks = 102, kTimes = 104;
 
-struct Section {
+struct SavedSection {
   std::uint32_t tag = 0;
   std::string bytes;
-  bool operator==(const Section& other) const { return tag == other.tag && bytes == other.bytes; }
+  bool operator==(const SavedSection& other) const { return tag == other.tag && bytes == other.bytes; }
 };
-using Sections = std::vector<Section>;
+using Sections = std::vector<SavedSection>;
 
 template <class Object>  // Odometry, GlobalAdjustment
 Sections SectionsOf(const Object& object) {
@@ -43,7 +43,7 @@ Sections SectionsOf(const Object& object) {
 
 inline Sections WithoutTimes(Sections sections) {
   sections.erase(std::remove_if(sections.begin(), sections.end(),
-                                [](const Section& section) { return section.tag == kTimes; }),
+                                [](const SavedSection& section) { return section.tag == kTimes; }),
                  sections.end());
   return sections;
 }
@@ -57,7 +57,7 @@ inline void ExpectEqual(const Sections& a, const Sections& b) {
 
 inline void WriteSections(const std::filesystem::path& file, const Sections& sections) {
   internal::SectionWriter out(file, kStateFile);
-  for (const Section& section : sections) out.Write(section.tag, section.bytes);
+  for (const SavedSection& section : sections) out.Write(section.tag, section.bytes);
   out.Finish();
 }
 
@@ -117,7 +117,7 @@ class Rider {
   Rider Again(const std::filesystem::path& file, bool own_threads = true) const {
     Sections sections = SectionsOf(odometry_);
     if (adjustment_) {
-      for (Section& section : SectionsOf(*adjustment_)) sections.push_back(std::move(section));
+      for (SavedSection& section : SectionsOf(*adjustment_)) sections.push_back(std::move(section));
     }
     WriteSections(file, sections);
     Rider again = *this;

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "core/numbers.h"
+#include "frontend/odometry/step_check.h"
+#include "tests/frontend/odometry/tracked_scene.h"
 #include "tests/support/recording.h"
 #include "tests/support/small_town.h"
 #include "tutti/frontend/odometry.h"
@@ -81,6 +83,38 @@ TEST(StepCheck, FindsAHeadingThatTurnsAway) {
 // T_seen = Exp(e) T_given, and the world comes nearer by less than was given: e is ahead.
 TEST(StepCheck, FindsStepsThatAreTooLong) {
   EXPECT_NEAR(MedianShareAhead(Checks(Street(SyntheticSensor::kStereo), 0, 1.2)), 0.2 / 1.2, 0.05);
+}
+
+// A walk to the side; the map has the poses as `as_mapped` makes them of the true ones.
+class ImagesContradictTest : public ::testing::Test, protected testing::TrackedScene {
+ protected:
+  template <class AsMapped>
+  bool Contradicted(const AsMapped& as_mapped) const {
+    Map map(PyramidScales(OdometryOptions()));
+    for (int i = 0; i < 6; ++i) {
+      const Pose pose = testing::Moved(0.1 * i, 0.02 * i, 0.03 * i);
+      const TrackedFrame frame = Frame(pose, 0.1 * i);
+      Keyframe keyframe;
+      keyframe.frame_index = i;
+      keyframe.stamp_s = frame.stamp_s;
+      keyframe.features = frame.features;
+      keyframe.landmarks.assign(frame.features->size(), -1);
+      keyframe.T_world_camera = as_mapped(pose);
+      map.AddKeyframe(keyframe);
+    }
+    return ImagesContradict(map, camera_, 5, OdometryOptions().min_inliers);
+  }
+};
+
+TEST_F(ImagesContradictTest, AMapThatHasTheWayAtAnyScaleIsNot) {
+  EXPECT_FALSE(Contradicted([](const Pose& pose) { return pose; }));
+  EXPECT_FALSE(Contradicted([](const Pose& pose) { return Pose(pose.rotation, 0.1 * pose.translation); }));
+}
+
+TEST_F(ImagesContradictTest, AMapThatHasAnotherWayIs) {
+  EXPECT_TRUE(Contradicted([](const Pose& pose) {
+    return Pose(pose.rotation, {0, pose.translation.x(), pose.translation.z()});
+  }));
 }
 
 }  // namespace

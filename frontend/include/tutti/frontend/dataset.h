@@ -13,6 +13,7 @@
 #include "tutti/core/pose.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/imu.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
@@ -84,6 +85,11 @@ struct DatasetOptions {
                "turn the images so far clockwise, so that they are upright: 90, 180 or 270. The camera is "
                "given as it is, before that",
                Basic(), Unit("deg"), From(0), To(270));
+  TUTTI_OPTION(
+      bool, imu, true,
+      "use the measurements of an IMU that lie beside the images (mav0/imu0, imu.csv, imu.txt), unless "
+      "they contradict themselves or the images",
+      Basic());
   TUTTI_OPTION(double, noise, 0,
                "standard deviation of Gaussian noise that is added to the images, to see how a result holds; "
                "0: none",
@@ -122,6 +128,17 @@ struct DatasetOptions {
                "RGB-D: a depth image was taken so long before its time stamp, by the colour camera's clock; "
                "negative: after it; 0: unknown, colour and depth are taken to be of one time",
                Section("camera"), Unit("s"), From(-0.1), To(0.1));
+  TUTTI_OPTION(
+      TransformRows, T_camera_imu, {},
+      "4x4 matrix, row by row, that takes a point from the IMU's frame to that of the (left) camera as "
+      "calibrated (Kalibr: T_cam_imu of cam0), translation in metres; zeros: as the data set has it, "
+      "else it is measured",
+      Section("camera"));
+  TUTTI_OPTION(
+      double, time_offset_s, 0,
+      "added to the IMU's stamps gives the camera's clock (Kalibr: timeshift_cam_imu, with the other "
+      "sign); what is left of it, up to 0.075 s, is measured",
+      Section("imu"), Unit("s"), From(-10), To(10));
   TUTTI_OPTIONS_END;
 
   /// Empty if usable, else what is wrong.
@@ -170,6 +187,9 @@ class Dataset {
   virtual double SkippedShare() const { return 0; }
   /// The rig after rectification.
   virtual const CameraRig& Rig() const = 0;
+  /// What the measurements of an IMU beside the images show by themselves. With findings, frames come without
+  /// them. Nothing: there is no IMU, or it is not wanted.
+  virtual std::optional<ImuReport> Imu() const { return std::nullopt; }
   /// Clockwise angle by which the images of a video were turned, as its rotation flag says [deg]: the rig's
   /// camera was turned with them from that of the options, which is of the sensor's own orientation.
   virtual int TurnedBy() const { return 0; }

@@ -5,9 +5,12 @@
 #include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "tutti/core/camera.h"
+#include "tutti/core/imu.h"
 #include "tutti/core/options.h"
 #include "tutti/core/pose.h"
 
@@ -31,6 +34,7 @@ struct CameraRig {
   double readout_s = 0;      ///< rolling shutter: the last row is read so long after the first [s]
   double depth_delay_s = 0;  ///< RGB-D: a depth image was taken so long before its time stamp [s]
   bool calibrated = true;    ///< false: appearance only (no odometry is possible)
+  std::optional<ImuCalibration> imu;  ///< what is known of an IMU on it; none: nothing
 };
 
 /// One rectified frame.
@@ -43,7 +47,9 @@ struct InputFrame {
                        ///< is absent, empty
   double clock_s = 0;  ///< a regular clock says so much more than stamp_s, which jitters [s]
   double depth_later_s = 0;  ///< RGB-D: time stamp of the depth image less that of image, by such clocks [s]
-  cv::Mat mask;              ///< optional: CV_8UC1, same size as image; there are no features where it is 0
+  std::vector<ImuSample> imu;  ///< optional: measurements since the frame before, in order of time; those
+                               ///< that came a little after the image may be among them
+  cv::Mat mask;                ///< optional: CV_8UC1, same size as image; there are no features where it is 0
   std::shared_ptr<const FrameFeatures>
       features;  ///< optional: Odometry::Extract's result, made on another thread
 };

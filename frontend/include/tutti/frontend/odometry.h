@@ -14,6 +14,7 @@
 #include "tutti/core/span_recorder.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/global_adjustment.h"
+#include "tutti/frontend/imu.h"
 #include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry_options.h"
 
@@ -106,6 +107,7 @@ struct OdometryReport {
   double stereo_matches = 0;               ///< stereo: matches of the median frame
   std::optional<ClocksFound> clocks;       ///< RGB-D
   std::optional<LensFound> lens;           ///< one camera, by self-calibration; none with lens_sigma 0
+  std::optional<ImuReport> imu;            ///< what the images say of an IMU; none: it measured nothing
   std::optional<HeightFound>
       height;  ///< one camera above the ground; none: no ground was seen, or looked for
 };

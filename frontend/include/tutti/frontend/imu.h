@@ -1,0 +1,49 @@
+// What an inertial measurement unit says of itself, and what images say of it.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/core/imu.h"
+
+#pragma GCC visibility push(default)
+namespace tutti {
+
+/// Something that can't be right: the measured figure, and what to do. One sentence each.
+struct ImuFinding {
+  std::string measured;  ///< what was seen
+  std::string advice;    ///< what to do about it
+};
+
+/// Result of an examination. Zeros: not measured.
+struct ImuReport {
+  std::uint64_t samples = 0;
+  double rate_hz = 0;            ///< by the median interval [1/s]
+  double duration_s = 0;         ///< from the first to the last [s]
+  double missing_share = 0;      ///< of the measurements that the rate would give [0..1]
+  double longest_gap_s = 0;      ///< [s]
+  double acceleration_mps2 = 0;  ///< median length, in the unit of the file
+
+  // What the turning of a camera says of the gyroscope.
+  std::uint64_t steps = 0;  ///< from frame to frame, compared
+  double turned_deg = 0;    ///< by the camera, over all of them [deg]
+  double agreement = 0;     ///< share of the camera's turning that the gyroscope explains [0..1]
+  double residual_deg = 0;  ///< root mean square of what it does not explain of a step [deg]
+  std::optional<Eigen::Quaterniond>
+      R_camera_imu;                ///< mounting; none: it has not turned enough about two axes
+  double mounting_sigma_deg = 0;   ///< standard deviation, worst axis [deg]
+  double time_offset_s = 0;        ///< added to the IMU's stamps gives the camera's clock [s]
+  double time_offset_sigma_s = 0;  ///< standard deviation [s]
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();  ///< in the IMU's axes [rad/s]
+  bool trusted = false;              ///< it agrees with the camera, and its mounting and offset are known
+  std::vector<ImuFinding> findings;  ///< empty: nothing speaks against it
+};
+
+/// "IMU: 200 Hz, 82.3 s, mounting from sensor.yaml": one line about measurements that were found.
+std::string ImuText(const ImuReport& report);
+
+}  // namespace tutti
+#pragma GCC visibility pop

@@ -175,9 +175,10 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
     }
   }
   DropUnsetCameras(config.dataset);
-  // Keys of the camera stand in DatasetOptions, too.
-  const KeyMarks& camera = marks["camera"];
-  marks["dataset"].keys.insert(marks["dataset"].keys.end(), camera.keys.begin(), camera.keys.end());
+  for (const char* section : {"camera", "imu"}) {  // their keys stand in DatasetOptions, too
+    const KeyMarks& of = marks[section];
+    marks["dataset"].keys.insert(marks["dataset"].keys.end(), of.keys.begin(), of.keys.end());
+  }
   if (const auto problem = FirstProblem(config))
     Check(name, problem->first, marks[problem->first], problem->second);
   return config;

@@ -17,14 +17,14 @@ constexpr double kLeastTurned = 20 * internal::kRadians;  // in all,
 constexpr double kLeastRate = 2 * internal::kRadians;     // and per second, root mean square [rad/s]
 constexpr double kWidestOffset = 0.3, kCoarse = 0.02, kFine = 0.002;  // that are tried [s]
 constexpr double kMostOffset = 0.075;                                 // that is believed [s]
-constexpr double kAgrees = 0.9, kDisagrees = 0.6;                     // ImuReport::agreement
+constexpr double kTurnsAgree = 0.9, kTurnsDiffer = 0.6;               // ImuReport::agreement
 constexpr double kMountingOff = 5;                                    // from the calibration [deg]
 constexpr double kKnownMounting = 1.5, kKnownOffset = 0.005;          // standard deviations [deg], [s]
 constexpr double kMostBias = 0.35;                                    // [rad/s]
 constexpr int kExamineEvery = 50;                                     // frames
-constexpr double kHolds = 1;    // so long it carries the rotation alone [s]
-constexpr int kRounds = 3;      // of leaving outliers out
-constexpr double kOutlier = 4;  // of the median residual
+constexpr double kHolds = 1;       // so long it carries the rotation alone [s]
+constexpr int kOutlierRounds = 3;  // of leaving outliers out
+constexpr double kOutlier = 4;     // of the median residual
 
 }  // namespace
 
@@ -74,7 +74,7 @@ ImuExamination::Fit ImuExamination::FitAt(double offset_s, std::size_t most,
   Fit fit;
   fit.offset_s = offset_s;
   std::vector<double> squares;
-  for (int round = 0; round < kRounds && pairs.size() >= kLeastSteps; ++round) {
+  for (int round = 0; round < kOutlierRounds && pairs.size() >= kLeastSteps; ++round) {
     if (round > 0) {  // frames whose pose was wrong
       const double bound = kOutlier * kOutlier * internal::Median(squares);
       std::size_t kept = 0;
@@ -193,7 +193,7 @@ void ImuExamination::Judge(const Fit& fit) {
     report_.findings.push_back(
         {"its axes are left-handed: only mirrored does it turn as the images do",
          "two axes are swapped, or one has the wrong sign; look at the driver's order of x, y and z"});
-  if (report_.findings.empty() && fit.Agreement() < kDisagrees)
+  if (report_.findings.empty() && fit.Agreement() < kTurnsDiffer)
     report_.findings.push_back(
         {FormattedText(
              "it does not turn as the images do: at no mounting and no time offset does it explain more than "
@@ -211,7 +211,7 @@ void ImuExamination::Judge(const Fit& fit) {
   CheckMounting(fit);
   const bool clear = report_.findings.empty();
   const bool known = report_.R_camera_imu && report_.time_offset_sigma_s < kKnownOffset;
-  report_.trusted = clear && known && fit.Agreement() >= kAgrees;
+  report_.trusted = clear && known && fit.Agreement() >= kTurnsAgree;
 }
 
 // The mounting is measured where the camera turned about two axes; else the calibration is believed.

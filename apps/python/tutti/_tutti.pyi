@@ -39,7 +39,8 @@ class Camera:
 
 class Config:
     def __init__(self, file: Optional[Path] = None, *, dataset: Mapping[str, Any] = ...,
-                 camera: Mapping[str, Any] = ..., odometry: Mapping[str, Any] = ..., loops: Mapping[str, Any] = ...,
+                 camera: Mapping[str, Any] = ..., imu: Mapping[str, Any] = ...,
+                 odometry: Mapping[str, Any] = ..., loops: Mapping[str, Any] = ...,
                  graph: Mapping[str, Any] = ..., run: Mapping[str, Any] = ...) -> None: ...
     def options(self, section: str) -> Dict[str, Any]: ...
 
@@ -266,8 +267,7 @@ class Dataset:
                  depth_units_per_m: float = 0, max_depth_m: float = 0, max_association_s: float = 0.02,
                  rate_hz: float = 0, topic: str = '', right_topic: str = '', depth_topic: str = '', follow_s: float = 0,
                  start: int = 0, end: int = 0, stride: int = 1, mask: str = '', rotate: int = 0,
-                 imu: bool = True,
-                 noise: float = 0, noise_draw: int = 0,
+                 imu: bool = True, noise: float = 0, noise_draw: int = 0,
                  mirrored_ground_truth: bool = False) -> None: ...
     def __iter__(self) -> FrameIterator: ...
     def __len__(self) -> int: ...
@@ -431,7 +431,8 @@ class Keyframe:
 
 class SlamSystem:
     def __init__(self, rig: Rig, config: Optional[Config] = None, *, dataset: Mapping[str, Any] = ...,
-                 camera: Mapping[str, Any] = ..., odometry: Mapping[str, Any] = ..., loops: Mapping[str, Any] = ...,
+                 camera: Mapping[str, Any] = ..., imu: Mapping[str, Any] = ...,
+                 odometry: Mapping[str, Any] = ..., loops: Mapping[str, Any] = ...,
                  graph: Mapping[str, Any] = ..., run: Mapping[str, Any] = ...) -> None: ...
     @staticmethod
     def load(file: Path, threads: Optional[int] = None) -> SlamSystem: ...
@@ -462,7 +463,8 @@ class SlamSystem:
 
 class TrajectoryCloser:
     def __init__(self, rig: Rig, config: Optional[Config] = None, *, dataset: Mapping[str, Any] = ...,
-                 camera: Mapping[str, Any] = ..., odometry: Mapping[str, Any] = ..., loops: Mapping[str, Any] = ...,
+                 camera: Mapping[str, Any] = ..., imu: Mapping[str, Any] = ...,
+                 odometry: Mapping[str, Any] = ..., loops: Mapping[str, Any] = ...,
                  graph: Mapping[str, Any] = ..., run: Mapping[str, Any] = ...) -> None: ...
     def push(self, frame: Frame, T_odom_body: ArrayLike, sigma: Optional[Tuple[float, float]] = None) -> TrackResult: ...
     def finish(self) -> None: ...

@@ -11,14 +11,14 @@ OPERATORS = ("__init__", "__len__", "__getitem__", "__iter__", "__next__")
 # Whose keywords are a section of the configuration: (class, method): section, and keywords beside it, left out.
 OPTIONS = {
     ("LoopDetector", "__init__"): ("loops", {"preset"}, set()),
-    ("Camera", "__init__"): ("camera", set(), {"baseline_m", "fov_deg", "readout_s", "depth_delay_s", "right"}),
+    ("Camera", "__init__"): ("camera", set(), {"baseline_m", "fov_deg", "readout_s", "depth_delay_s", "T_camera_imu", "right"}),
     ("Dataset", "__init__"): ("dataset", set(), set()),
     ("PoseGraph", "optimize"): ("graph", set(), {"certify"}),
     ("Config", "__init__"): (None, set(), set()),
     ("SlamSystem", "__init__"): (None, set(), set()),
     ("TrajectoryCloser", "__init__"): (None, set(), set()),
 }
-SECTIONS = {"dataset", "camera", "odometry", "loops", "graph", "run"}
+SECTIONS = {"dataset", "camera", "imu", "odometry", "loops", "graph", "run"}
 
 
 @pytest.fixture(scope="module")

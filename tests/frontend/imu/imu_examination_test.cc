@@ -23,15 +23,15 @@ Eigen::Quaterniond TurnedAt(double t) {
          ExpSO3({0, 0.4 * std::sin(2.3 * t), 0});
 }
 
-struct Recording {
+struct TurnRecording {
   std::vector<ImuSample> samples;
   std::vector<double> times;                       // of frames
   std::vector<Eigen::Quaterniond> R_world_camera;  // of each
 };
 
 // 200 Hz and 20 frames a second; the IMU's stamps say so much more than the camera's clock.
-Recording Record(double seconds, double late_s = 0) {
-  Recording recording;
+TurnRecording RecordTurns(double seconds, double late_s = 0) {
+  TurnRecording recording;
   const double h = 1e-4;
   for (int i = 0; i * 0.005 < seconds; ++i) {
     const double t = i * 0.005;
@@ -48,7 +48,7 @@ Recording Record(double seconds, double late_s = 0) {
   return recording;
 }
 
-ImuExamination Examined(const Recording& recording, const ImuCalibration& known = {}) {
+ImuExamination Examined(const TurnRecording& recording, const ImuCalibration& known = {}) {
   ImuExamination examination(known);
   examination.Add(recording.samples);
   for (std::size_t i = 1; i < recording.times.size(); ++i)
@@ -58,7 +58,7 @@ ImuExamination Examined(const Recording& recording, const ImuCalibration& known 
   return examination;
 }
 
-std::string Findings(const ImuExamination& examination) {
+std::string FindingsOf(const ImuExamination& examination) {
   std::string text;
   for (const ImuFinding& f : examination.report().findings) text += f.measured + "; " + f.advice + "\n";
   return text;
@@ -72,9 +72,9 @@ ImuCalibration Mounted() {
 
 TEST(ImuExamination, FindsMountingBiasAndTimeOffsetOfAnUnknownImu) {
   for (const double late_s : {0.0, 0.005, 0.02, 0.05}) {
-    const ImuExamination examination = Examined(Record(20, late_s));
+    const ImuExamination examination = Examined(RecordTurns(20, late_s));
     const ImuReport& report = examination.report();
-    EXPECT_TRUE(report.trusted) << Findings(examination);
+    EXPECT_TRUE(report.trusted) << FindingsOf(examination);
     ASSERT_TRUE(report.R_camera_imu);
     EXPECT_LT(report.R_camera_imu->angularDistance(kMounting) * internal::kDegrees, 0.05);
     EXPECT_NEAR(report.time_offset_s, -late_s, 0.0005);
@@ -90,7 +90,7 @@ TEST(ImuExamination, FindsMountingBiasAndTimeOffsetOfAnUnknownImu) {
 }
 
 TEST(ImuExamination, BelievesPosesWithNoiseAndLeavesOutWrongOnes) {
-  Recording recording = Record(30);
+  TurnRecording recording = RecordTurns(30);
   std::uint64_t state = 1;
   const auto noise = [&] {
     state = state * 6364136223846793005ULL + 1442695040888963407ULL;
@@ -109,59 +109,61 @@ TEST(ImuExamination, BelievesPosesWithNoiseAndLeavesOutWrongOnes) {
 }
 
 TEST(ImuExamination, NamesEachContradiction) {
-  const Recording good = Record(20);
+  const TurnRecording good = RecordTurns(20);
   const auto with = [&](const auto& change) {
-    Recording recording = good;
+    TurnRecording recording = good;
     for (ImuSample& sample : recording.samples) change(sample);
     return Examined(recording, Mounted());
   };
-  EXPECT_EQ(Findings(with([](ImuSample&) {})), "");
-  EXPECT_NE(Findings(with([](ImuSample& s) { s.gyro *= internal::kDegrees; })).find("deg/s"),
+  EXPECT_EQ(FindingsOf(with([](ImuSample&) {})), "");
+  EXPECT_NE(FindingsOf(with([](ImuSample& s) { s.gyro *= internal::kDegrees; })).find("deg/s"),
             std::string::npos);
-  EXPECT_NE(Findings(with([](ImuSample& s) { std::swap(s.gyro.x(), s.gyro.y()); })).find("left-handed"),
+  EXPECT_NE(FindingsOf(with([](ImuSample& s) { std::swap(s.gyro.x(), s.gyro.y()); })).find("left-handed"),
             std::string::npos);
-  EXPECT_NE(Findings(with([](ImuSample& s) {
+  EXPECT_NE(FindingsOf(with([](ImuSample& s) {
               s.gyro = {s.gyro.y(), s.gyro.z(), s.gyro.x()};
             })).find("mounted otherwise"),
             std::string::npos);
-  EXPECT_NE(Findings(with([](ImuSample& s) { s.stamp_s += 0.1; })).find("off by -100 ms"), std::string::npos);
-  EXPECT_NE(Findings(with([](ImuSample& s) { s.stamp_s += 0.1; })).find("time_offset_s: -0.100"),
+  EXPECT_NE(FindingsOf(with([](ImuSample& s) { s.stamp_s += 0.1; })).find("off by -100 ms"),
             std::string::npos);
-  EXPECT_NE(Findings(with([](ImuSample& s) { s.gyro = Eigen::Vector3d(0.001, 0, 0); })).find("does not turn"),
+  EXPECT_NE(FindingsOf(with([](ImuSample& s) { s.stamp_s += 0.1; })).find("time_offset_s: -0.100"),
             std::string::npos);
-  Recording other = good;
+  EXPECT_NE(
+      FindingsOf(with([](ImuSample& s) { s.gyro = Eigen::Vector3d(0.001, 0, 0); })).find("does not turn"),
+      std::string::npos);
+  TurnRecording other = good;
   for (std::size_t i = 0; i < other.samples.size(); ++i) {
     const double t = 7 + 1.31 * other.samples[i].stamp_s;
     other.samples[i].gyro = LogSO3(TurnedAt(t).conjugate() * TurnedAt(t + 1e-4)) / 1e-4;
   }
   const ImuExamination foreign = Examined(other, Mounted());
-  EXPECT_NE(Findings(foreign).find("does not turn as the images do"), std::string::npos);
+  EXPECT_NE(FindingsOf(foreign).find("does not turn as the images do"), std::string::npos);
   EXPECT_FALSE(foreign.report().trusted);
   EXPECT_FALSE(foreign.CameraTurn(10, 10.05));
 }
 
 TEST(ImuExamination, SaysNothingWithoutTurning) {
-  Recording still = Record(20);
+  TurnRecording still = RecordTurns(20);
   for (ImuSample& sample : still.samples) sample.gyro = kBias;
   for (Eigen::Quaterniond& R : still.R_world_camera) R.setIdentity();
   const ImuExamination examination = Examined(still, Mounted());
-  EXPECT_EQ(Findings(examination), "");
+  EXPECT_EQ(FindingsOf(examination), "");
   EXPECT_FALSE(examination.report().trusted);
 }
 
 TEST(ImuExamination, AboutOneAxisBelievesTheCalibration) {
-  Recording car = Record(20);
+  TurnRecording car = RecordTurns(20);
   const auto heading = [](double t) { return ExpSO3({0, 0, 0.6 * std::sin(0.8 * t)}); };
   for (ImuSample& s : car.samples) s.gyro = Eigen::Vector3d(0, 0, 0.48 * std::cos(0.8 * s.stamp_s)) + kBias;
   for (std::size_t i = 0; i < car.times.size(); ++i)
     car.R_world_camera[i] = heading(car.times[i]) * kMounting.conjugate();
   EXPECT_FALSE(Examined(car).report().trusted);
   const ImuExamination known = Examined(car, Mounted());
-  EXPECT_TRUE(known.report().trusted) << Findings(known);
+  EXPECT_TRUE(known.report().trusted) << FindingsOf(known);
 }
 
 TEST(ImuExamination, GoesOnFromItsState) {
-  const Recording recording = Record(20);
+  const TurnRecording recording = RecordTurns(20);
   ImuExamination before = Examined(recording);
   internal::SharedObjectsOut out_shared;
   internal::StateWriter out(&out_shared);
@@ -183,7 +185,7 @@ TEST(ImuExamination, OfRealRecordingsExplainsTheirPoses) {
                           poses[i - 1].pose.rotation.conjugate() * poses[i].pose.rotation);
     examination.Examine();
     const ImuReport& report = examination.report();
-    EXPECT_TRUE(report.trusted) << name << Findings(examination);
+    EXPECT_TRUE(report.trusted) << name << FindingsOf(examination);
     EXPECT_LT(report.residual_deg, 0.02) << name;
     EXPECT_LT(std::abs(report.time_offset_s), 0.002) << name;
     ASSERT_TRUE(report.R_camera_imu);

@@ -88,8 +88,7 @@ struct DatasetOptions {
   TUTTI_OPTION(
       bool, imu, true,
       "use the measurements of an IMU that lie beside the images (mav0/imu0, imu.csv, imu.txt), unless "
-      "they contradict themselves or the images",
-      Basic());
+      "they contradict themselves or the images (--no-imu turns it off)");
   TUTTI_OPTION(double, noise, 0,
                "standard deviation of Gaussian noise that is added to the images, to see how a result holds; "
                "0: none",

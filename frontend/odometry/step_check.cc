@@ -17,11 +17,12 @@ constexpr double kFewestShare = 0.5;  // of the points that both see
 constexpr double kVariances = 4;      // points of one image share their errors
 constexpr int kWatched = 12;          // keyframes after a thin one, or after a submap's first
 constexpr int kThin = 3;              // times the fewest inliers of a pose: landmarks of a thin keyframe
-constexpr std::array<std::size_t, 2> kBack = {2, 4};  // keyframes that a new one is compared with
-constexpr float kAlike = 50;                          // bits
-constexpr double kOnLine = 2;                         // distance from an epipolar line [px]
-constexpr int kLeastAgreeing = 120;                   // matches that an essential matrix fits, of both pairs
-constexpr double kLeastByMap = 0.65;                  // of them, that the map's poses fit
+constexpr std::array<int, 2> kBack = {2, 4};  // keyframes that a new one is compared with
+constexpr float kAlike = 50;                  // bits
+constexpr double kOnLine = 2;                 // distance from an epipolar line [px]
+constexpr int kLeastAgreeing = 120;           // matches that an essential matrix fits, of both pairs
+constexpr double kLeastByMap = 0.65;          // share of them that the map's poses fit
+constexpr double kLeastNear = 0.9;            // or within twice the distance: the poses are only inexact
 
 // The keyframe's feature that sees a landmark; -1: none.
 int FeatureOf(const Landmark& landmark, int keyframe) {
@@ -113,25 +114,17 @@ struct RayPairs {
   std::vector<Eigen::Vector2d> first, second;
 };
 
-// The poses of a keyframe and of those kBack before it, against the essential matrices of their images.
-// `newest`: keyframes of its submap, itself first.
-bool Contradicted(const Map& map, const PinholeCamera& camera, const std::vector<int>& newest,
-                  std::size_t keyframe) {
-  const double bound = kOnLine / (0.5 * (camera.fx + camera.fy));
-  const Keyframe& to = map.keyframe(newest[keyframe]);
-  int by_map = 0, by_images = 0;
-  for (const std::size_t back : kBack) {
-    if (keyframe + back >= newest.size()) break;
-    const Keyframe& from = map.keyframe(newest[keyframe + back]);
-    const RayPairs pairs(camera, *from.features, *to.features);
-    const auto fit = internal::FitEssential(pairs.first, pairs.second, bound, 0.999);
-    if (!fit) continue;
-    const Pose T_to_from = to.T_world_camera.Inverse() * from.T_world_camera;
-    by_images += pairs.Agreeing(fit->matrix, bound);
-    by_map += pairs.Agreeing(Skew(T_to_from.translation) * T_to_from.rotation.toRotationMatrix(), bound);
+// Matches that two essential matrices fit: that of the images, and that of the map's poses.
+struct Agreement {
+  void Add(const RayPairs& pairs, const Eigen::Matrix3d& by_images, const Eigen::Matrix3d& by_map,
+           double bound) {
+    images += pairs.Agreeing(by_images, bound);
+    map += pairs.Agreeing(by_map, bound);
   }
-  return by_images >= kLeastAgreeing && by_map < kLeastByMap * by_images;
-}
+  double ByMap() const { return static_cast<double>(map) / std::max(1, images); }
+
+  int images = 0, map = 0;
+};
 
 }  // namespace
 
@@ -140,8 +133,20 @@ bool ImagesContradict(const Map& map, const PinholeCamera& camera, int keyframe,
   const bool begins = static_cast<int>(newest.size()) < kWatched;
   const auto thin = [&](int id) { return IsThin(map, map.keyframe(id), min_inliers); };
   if (!begins && std::none_of(newest.begin(), newest.end(), thin)) return false;
-  // One alone may be a pose of a sharp bend, which the next ones mend.
-  return Contradicted(map, camera, newest, 0) && Contradicted(map, camera, newest, 1);
+  const double bound = kOnLine / (0.5 * (camera.fx + camera.fy));
+  Agreement on_line, near_line;
+  for (const int back : kBack) {
+    if (back >= static_cast<int>(newest.size())) break;
+    const Keyframe &from = map.keyframe(newest[static_cast<std::size_t>(back)]), &to = map.keyframe(keyframe);
+    const RayPairs pairs(camera, *from.features, *to.features);
+    const auto fit = internal::FitEssential(pairs.first, pairs.second, bound, 0.999);
+    if (!fit) continue;
+    const Pose T_to_from = to.T_world_camera.Inverse() * from.T_world_camera;
+    const Eigen::Matrix3d by_map = Skew(T_to_from.translation) * T_to_from.rotation.toRotationMatrix();
+    on_line.Add(pairs, fit->matrix, by_map, bound);
+    near_line.Add(pairs, fit->matrix, by_map, 2 * bound);
+  }
+  return on_line.images >= kLeastAgreeing && on_line.ByMap() < kLeastByMap && near_line.ByMap() < kLeastNear;
 }
 
 std::optional<StepCheck> CheckStep(const Map& map, const CameraRig& rig, const OdometryOptions& options,

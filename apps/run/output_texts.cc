@@ -168,6 +168,11 @@ Json ImuJson(const ImuReport& imu) {
     q.push_back(imu.R_camera_imu->w());
     json["images_say"]["R_camera_imu_xyzw"] = q;
   }
+  if (imu.up)
+    json["gravity"] = {{"mps2", imu.gravity_mps2},
+                       {"up", vector(*imu.up)},
+                       {"up_sigma_deg", imu.up_sigma_deg},
+                       {"acceleration_bias_mps2", vector(imu.acceleration_bias)}};
   return json;
 }
 

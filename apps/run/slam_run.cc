@@ -204,8 +204,14 @@ void SlamRun::Collect() {
     result_.cpu_s += result_.focal_length_of_map->cpu_s;
   }
   if (!alone_) return;
-  result_.trajectory_odometry =
-      BodyTrajectory(FrameTrajectory(alone_->Tracked().map(), -1, session), result_.rig);
+  const Odometry& alone = alone_->Tracked();
+  Trajectory poses = FrameTrajectory(alone.map(), -1, session);
+  const std::optional<ImuReport> imu = alone.Report().imu;
+  if (imu && imu->up) {  // its world has its z axis upwards, too
+    const Pose upright(Eigen::Quaterniond::FromTwoVectors(*imu->up, Eigen::Vector3d::UnitZ()), {0, 0, 0});
+    for (StampedPose& pose : poses) pose.pose = upright * pose.pose;
+  }
+  result_.trajectory_odometry = BodyTrajectory(poses, result_.rig);
 }
 
 void SlamRun::NoteJoining(const MapSession& own) {

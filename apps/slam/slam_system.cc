@@ -143,6 +143,7 @@ class SlamSystem::Impl {
     }
     loops_.Finish(mutable_odometry(), frames_);
     if (odometry_) JoinSubmaps();
+    if (odometry_ && sessions_.size() == 1) StandUpright();
     if (odometry_) sessions_.NoteJoined(*odometry_);
   }
 
@@ -230,6 +231,21 @@ class SlamSystem::Impl {
     const int keyframes = odometry_->map().KeyframeCount();
     if (!config_.run.loops || std::exchange(searched_, keyframes) == keyframes) return;
     SubmapJoiner(config_, frames_, &loops_, &*odometry_).Join();
+  }
+
+  // The world's z axis points up if an IMU knows where that is.
+  void StandUpright() {
+    constexpr double kUpright = 0.002;  // it is, no matter what a loop more says [rad]
+    const std::optional<ImuReport> imu = odometry_->Report().imu;
+    if (!imu || !imu->up) return;
+    const auto turn = Eigen::Quaterniond::FromTwoVectors(*imu->up, Eigen::Vector3d::UnitZ());
+    if (turn.angularDistance(Eigen::Quaterniond::Identity()) < kUpright) return;
+    std::map<int, Similarity> upright;
+    for (const int id : odometry_->map().KeyframeIds()) {
+      const Pose T = Pose(turn, Eigen::Vector3d::Zero()) * odometry_->map().keyframe(id).T_world_camera;
+      upright[id] = Similarity(T);
+    }
+    MapMerge::MoveAll(upright, &loops_, &*odometry_);
   }
 
   // What is due by now.

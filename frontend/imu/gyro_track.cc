@@ -11,7 +11,7 @@ constexpr double kGap = 0.06;  // longer, the turning between two measurements i
 }  // namespace
 
 void GyroTrack::Add(const ImuSample& sample) {
-  Knot knot{sample.stamp_s, sample.gyro, Eigen::Quaterniond::Identity()};
+  Knot knot{sample.stamp_s, sample.gyro, Eigen::Quaterniond::Identity(), sample.acceleration};
   if (!knots_.empty()) {
     const Knot& last = knots_.back();
     const double dt = sample.stamp_s - last.stamp_s;
@@ -61,6 +61,26 @@ std::optional<Eigen::Quaterniond> GyroTrack::Turned(double from_s, double to_s,
   return turned.normalized();
 }
 
+std::optional<Eigen::Vector3d> GyroTrack::VelocityGained(double from_s, double to_s,
+                                                         const Eigen::Vector3d& gyro_bias) const {
+  const std::size_t first = Before(from_s), last = Before(to_s);
+  if (first == knots_.size() || last == knots_.size() || !(from_s <= to_s)) return std::nullopt;
+  Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d gained = Eigen::Vector3d::Zero();
+  for (std::size_t k = first; k <= last; ++k) {
+    const Knot &a = knots_[k], &b = knots_[k + 1];
+    if (b.stamp_s - a.stamp_s > kGap) return std::nullopt;
+    const double begin = std::max(from_s, a.stamp_s), end = std::min(to_s, b.stamp_s);
+    const double middle = 0.5 * (begin + end);
+    const Eigen::Quaterniond half = ExpSO3(Within(k, begin, middle) - (middle - begin) * gyro_bias);
+    const Eigen::Vector3d acceleration =
+        a.acceleration + (middle - a.stamp_s) / (b.stamp_s - a.stamp_s) * (b.acceleration - a.acceleration);
+    gained += (end - begin) * (turned * (half * acceleration));
+    turned = (turned * ExpSO3(Within(k, begin, end) - (end - begin) * gyro_bias)).normalized();
+  }
+  return gained;
+}
+
 std::optional<double> GyroTrack::MeanRate(double from_s, double to_s) const {
   const std::size_t first = Before(from_s), last = Before(to_s);
   if (first == knots_.size() || last == knots_.size()) return std::nullopt;
@@ -72,7 +92,8 @@ std::optional<double> GyroTrack::MeanRate(double from_s, double to_s) const {
 bool GyroTrack::IsPossible() const {
   for (std::size_t k = 0; k < knots_.size(); ++k) {
     const Knot& knot = knots_[k];
-    if (!std::isfinite(knot.stamp_s) || !knot.gyro.allFinite() || !knot.turned.coeffs().allFinite())
+    if (!std::isfinite(knot.stamp_s) || !knot.gyro.allFinite() || !knot.acceleration.allFinite() ||
+        !knot.turned.coeffs().allFinite())
       return false;
     if (k > 0 && !(knot.stamp_s > knots_[k - 1].stamp_s)) return false;
   }

@@ -1,4 +1,4 @@
-// How an IMU turned, from its angular velocities.
+// How an IMU turned and what it gained of velocity, from its measurements.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -28,6 +28,10 @@ class GyroTrack {
   /// The same with a bias taken out.
   std::optional<Eigen::Quaterniond> Turned(double from_s, double to_s, const Eigen::Vector3d& bias) const;
 
+  /// Integral of the accelerations as measured, with gravity, turned into the axes at `from_s` [m/s].
+  std::optional<Eigen::Vector3d> VelocityGained(double from_s, double to_s,
+                                                const Eigen::Vector3d& gyro_bias) const;
+
   /// False for numbers from a damaged file.
   bool IsPossible() const;
   /// Mean length of the angular velocities between two times, as they are [rad/s].
@@ -43,9 +47,10 @@ class GyroTrack {
     double stamp_s = 0;
     Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
     Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();  // since the first one
+    Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
     template <class Archive>
     void State(Archive& archive) {
-      archive(stamp_s, gyro, turned);
+      archive(stamp_s, gyro, turned, acceleration);
     }
   };
   // The last one that is not later; knots_.size(): there is none, or none after it, or a gap follows.

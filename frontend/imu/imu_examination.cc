@@ -269,6 +269,12 @@ std::optional<Eigen::Quaterniond> ImuExamination::CameraTurn(double from_s, doub
   return (R * turned->conjugate() * R.conjugate()).normalized();
 }
 
+std::optional<Eigen::Vector3d> ImuExamination::VelocityGained(double from_s, double to_s) const {
+  if (!report_.trusted) return std::nullopt;
+  const double offset = report_.time_offset_s;
+  return track_.VelocityGained(from_s - offset, to_s - offset, report_.gyro_bias);
+}
+
 bool ImuExamination::IsPossible() const {
   const auto finite = [](const Step& step) {
     return std::isfinite(step.from_s) && step.to_s > step.from_s && step.turn.allFinite();

@@ -49,6 +49,13 @@ class ImuExamination {
   const ImuReport& report() const { return report_; }
   /// R_to_from of the camera between two times, if the IMU is trusted and has measured all the while.
   std::optional<Eigen::Quaterniond> CameraTurn(double from_s, double to_s) const;
+  /// What the IMU gained of velocity between two times, with gravity, in its axes at the first one [m/s]; if
+  /// it is trusted and has measured all the while.
+  std::optional<Eigen::Vector3d> VelocityGained(double from_s, double to_s) const;
+  /// Measurements go on at least until then, by the camera's clock.
+  bool ReachesTo(double stamp_s) const {
+    return !empty() && track_.end_s() > stamp_s - report_.time_offset_s;
+  }
   bool empty() const { return track_.empty(); }
   /// False for numbers from a damaged file.
   bool IsPossible() const;

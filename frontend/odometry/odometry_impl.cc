@@ -62,6 +62,10 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
   const Pose T_last_world = last().T_camera_world;
   const double last_stamp_s = last().frame.stamp_s, last_s = last().frame.Time();
   const auto [frame, tracked] = Look(input);
+  if (!imu_.empty()) {
+    gravity_.AddFrame(frame.index, frame.Time());
+    gravity_.Take(imu_);
+  }
   if (tracked.fix) CompareTurn(T_last_world, last_s, *tracked.fix);
   if (tracked.fix && keeps_height_)
     height_.See(rig_.camera, frame.features, last().T_camera_world, T_last_world,
@@ -301,7 +305,14 @@ OdometryReport Odometry::Impl::Report() const {
   if (mapper_.lens().Enabled()) report.lens = mapper_.lens().Found();
   report.height = height_.Found();
   report.clocks = clocks_.Found();
-  if (!imu_.empty()) report.imu = imu_.report();
+  if (!imu_.empty()) {
+    report.imu = imu_.report();
+    const Trajectory poses = FrameTrajectory(map());
+    const std::vector<std::int64_t> numbers = FrameIndices(map());
+    std::map<std::int64_t, Pose> T_world_camera;
+    for (std::size_t i = 0; i < numbers.size(); ++i) T_world_camera[numbers[i]] = poses[i].pose;
+    gravity_.Find(T_world_camera, rig_.sensor != Sensor::kMono, &*report.imu);
+  }
   return report;
 }
 

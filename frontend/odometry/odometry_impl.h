@@ -9,6 +9,7 @@
 
 #include "core/section_file.h"
 #include "core/stopwatch.h"
+#include "frontend/imu/gravity.h"
 #include "frontend/imu/imu_examination.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/camera_height.h"
@@ -107,6 +108,7 @@ class Odometry::Impl {
   RollingStart rolling_start_;
   ClockEstimate clocks_;
   ImuExamination imu_;
+  Gravity gravity_;
   Relocalizer relocalizer_;
   PoseFollower follower_;
   Localizer localizer_;

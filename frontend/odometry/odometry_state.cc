@@ -200,7 +200,7 @@ void Odometry::Impl::Save(const internal::SectionSink& sink) const {
     });
   }
   write(OdometrySection::kTracking, [&](auto& out) { out(*this); });
-  if (!imu_.empty()) write(OdometrySection::kImu, [&](auto& out) { out(imu_); });
+  if (!imu_.empty()) write(OdometrySection::kImu, [&](auto& out) { out(imu_, gravity_); });
   write(OdometrySection::kTimes, [&](auto& out) { out(stages_.milliseconds); });
   sink(Tag(OdometrySection::kEndOfOdometry), "");
 }
@@ -232,7 +232,7 @@ void Odometry::Impl::Load(internal::SectionReader* file) {
   }
   ReadSection(OdometrySection::kTracking, file, &shared, [&](auto& in) { in(*this); });
   if (file->Peek() == Tag(OdometrySection::kImu))
-    ReadSection(OdometrySection::kImu, file, &shared, [&](auto& in) { in(imu_); });
+    ReadSection(OdometrySection::kImu, file, &shared, [&](auto& in) { in(imu_, gravity_); });
   ReadSection(OdometrySection::kTimes, file, &shared, [&](auto& in) { in(stages_.milliseconds); });
   file->Expect(Tag(OdometrySection::kEndOfOdometry));
   Check(*file);
@@ -249,7 +249,7 @@ void Odometry::Impl::Check(const internal::SectionReader& file) const {
   internal::CheckKeyframe(result_.keyframe, map(), file, true);
   internal::CheckIndex(session_piece_, 0, initializer_.piece() + 1, file);
   internal::CheckIndex(first_unmoved_, 0, map().KeyframeCount() + 1, file);
-  if (!imu_.IsPossible()) file.Damaged("measurements of an IMU that are none");
+  if (!imu_.IsPossible() || !gravity_.IsPossible()) file.Damaged("measurements of an IMU that are none");
   if (!height_.IsPossible()) file.Damaged("a height above the ground that is none");
   if (frame_offset_ < 0) file.Damaged("frames with impossible numbers");
   for (const std::vector<double>* numbers : {&row_errors_, &stereo_matches_}) {

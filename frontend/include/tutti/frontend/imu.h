@@ -38,6 +38,13 @@ struct ImuReport {
   double time_offset_s = 0;        ///< added to the IMU's stamps gives the camera's clock [s]
   double time_offset_sigma_s = 0;  ///< standard deviation [s]
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();  ///< in the IMU's axes [rad/s]
+
+  // What the accelerometer says of the map, if it says it to a degree.
+  std::optional<Eigen::Vector3d> up;  ///< unit vector against gravity, in the map's frame of reference
+  double up_sigma_deg = 0;            ///< standard deviation of an axis [deg]
+  double gravity_mps2 = 0;            ///< length of gravity, as measured [m/s^2]
+  Eigen::Vector3d acceleration_bias = Eigen::Vector3d::Zero();  ///< in the IMU's axes [m/s^2]
+
   bool trusted = false;              ///< it agrees with the camera, and its mounting and offset are known
   std::vector<ImuFinding> findings;  ///< empty: nothing speaks against it
 };

@@ -1,0 +1,135 @@
+#include "frontend/imu/gravity.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/dense_solvers.h"
+#include "core/numbers.h"
+
+namespace tutti {
+namespace {
+
+constexpr double kWindow_s = 2;
+constexpr double kLongestStep_s = 0.5;  // between frames
+constexpr std::size_t kLeastWindows = 3;
+constexpr int kWeightings = 8;
+constexpr double kBiasSigma = 0.3;                  // of an accelerometer, before anything is known [m/s^2]
+constexpr double kLeastSigma = 0.02;                // of a window [m/s^2]
+constexpr double kStandard = 9.81, kMostOff = 0.5;  // [m/s^2]
+constexpr double kMostSigma_deg = 1;
+constexpr std::size_t kMostWaiting = 2000;
+
+using Unknowns = Eigen::Matrix<double, 7, 1>;  // g u, b, s
+using Normal = Eigen::Matrix<double, 7, 7>;
+
+}  // namespace
+
+struct Gravity::Window {
+  Eigen::Vector3d felt = Eigen::Vector3d::Zero();      // mean of R a [m/s^2]
+  Eigen::Vector3d moved = Eigen::Vector3d::Zero();     // mean acceleration that the poses say
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();  // mean R_world_imu
+
+  Eigen::Vector3d MisfitOf(const Unknowns& x) const {
+    return felt - x.head<3>() - rotation * x.segment<3>(3) - x[6] * moved;
+  }
+};
+
+void Gravity::Take(const ImuExamination& imu) {
+  while (waiting_.size() > kMostWaiting) waiting_.pop_front();
+  if (!imu.report().trusted) return;
+  while (waiting_.size() > 1 && imu.ReachesTo(waiting_[1].stamp_s)) {
+    const Frame from = waiting_[0], to = waiting_[1];
+    waiting_.pop_front();
+    if (!(to.stamp_s - from.stamp_s <= kLongestStep_s)) continue;
+    if (const auto gained = imu.VelocityGained(from.stamp_s, to.stamp_s))
+      steps_.push_back({from, to, *gained});
+  }
+}
+
+std::vector<Gravity::Window> Gravity::WindowsOf(const std::map<std::int64_t, Pose>& T_world_camera,
+                                                const Eigen::Quaterniond& R_camera_imu) const {
+  const auto pose = [&](std::int64_t number) -> const Pose* {
+    const auto at = T_world_camera.find(number);
+    return at == T_world_camera.end() ? nullptr : &at->second;
+  };
+  // Of the frame between two steps, by the poses at their other ends.
+  const auto velocity = [&](std::size_t step) -> std::optional<Eigen::Vector3d> {
+    const Step &before = steps_[step], &after = steps_[step + 1];
+    const Pose *from = pose(before.from.number), *to = pose(after.to.number);
+    if (before.to.number != after.from.number || !from || !to) return std::nullopt;
+    return (to->translation - from->translation) / (after.to.stamp_s - before.from.stamp_s);
+  };
+  std::vector<Window> windows;
+  for (std::size_t first = 0; first + 2 < steps_.size();) {
+    const std::size_t begin = first++;  // whose end the window begins at
+    const auto v_from = velocity(begin);
+    if (!v_from) continue;
+    Window window;
+    double seconds = 0;
+    std::size_t k = begin + 1;
+    for (; k + 1 < steps_.size() && seconds < kWindow_s; ++k) {
+      const Pose* at = pose(steps_[k].from.number);
+      if (!at || steps_[k - 1].to.number != steps_[k].from.number) break;
+      const double dt = steps_[k].to.stamp_s - steps_[k].from.stamp_s;
+      const Eigen::Matrix3d R = (at->rotation * R_camera_imu).toRotationMatrix();
+      window.felt += R * steps_[k].gained;
+      window.rotation += dt * R;
+      seconds += dt;
+    }
+    const auto v_to = seconds < kWindow_s ? std::nullopt : velocity(k - 1);
+    if (!v_to) continue;
+    window.felt /= seconds;
+    window.rotation /= seconds;
+    window.moved = (*v_to - *v_from) / seconds;
+    windows.push_back(window);
+    first = k - 1;
+  }
+  return windows;
+}
+
+void Gravity::Find(const std::map<std::int64_t, Pose>& T_world_camera, bool metric, ImuReport* report) const {
+  if (!report->trusted || !report->R_camera_imu) return;
+  const std::vector<Window> windows = WindowsOf(T_world_camera, *report->R_camera_imu);
+  if (windows.size() < kLeastWindows) return;
+  Unknowns x = Unknowns::Zero();
+  Normal normal;
+  double sigma = kBiasSigma;
+  for (int round = 0; round < kWeightings; ++round) {
+    normal.setZero();
+    Unknowns right = Unknowns::Zero();
+    normal.diagonal().segment<3>(3).setConstant(1 / (kBiasSigma * kBiasSigma));
+    normal(6, 6) = metric ? 1e6 : 1e-6;  // the scale of a metric map is 1
+    right[6] = metric ? 1e6 : 0;
+    std::vector<double> misfits;
+    for (const Window& w : windows) {
+      Eigen::Matrix<double, 3, 7> by;
+      by << Eigen::Matrix3d::Identity(), w.rotation, w.moved;
+      const double misfit = w.MisfitOf(x).norm();
+      const double weight = round == 0 ? 1 : 1 / (1 + misfit * misfit / (4 * sigma * sigma));
+      normal += weight / (sigma * sigma) * by.transpose() * by;
+      right += weight / (sigma * sigma) * by.transpose() * w.felt;
+    }
+    x = internal::SolveLdlt<7>(normal, right);
+    for (const Window& w : windows) misfits.push_back(w.MisfitOf(x).norm());
+    sigma = std::max(kLeastSigma, internal::Median(misfits) / 1.54);  // of one axis, were they normal
+  }
+  const auto covariance = internal::InverseInformation(normal);
+  const double length = x.head<3>().norm();
+  if (!covariance || !x.allFinite() || !(std::abs(length - kStandard) < kMostOff)) return;
+  const Eigen::Vector3d variances = Eigen::MatrixXd(*covariance).diagonal().head<3>();
+  const double sigma_deg = std::sqrt(variances.maxCoeff()) / length * internal::kDegrees;
+  if (!(sigma_deg < kMostSigma_deg)) return;
+  report->up = x.head<3>() / length;
+  report->up_sigma_deg = sigma_deg;
+  report->gravity_mps2 = length;
+  report->acceleration_bias = x.segment<3>(3);
+}
+
+bool Gravity::IsPossible() const {
+  for (const Step& step : steps_) {
+    if (!step.gained.allFinite() || !(step.to.stamp_s > step.from.stamp_s)) return false;
+  }
+  return waiting_.size() <= kMostWaiting + 1;
+}
+
+}  // namespace tutti

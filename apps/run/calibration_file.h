@@ -19,6 +19,8 @@ struct Calibration {
   std::string format;                  ///< "Kalibr, cam0 of 2", ...: what was read, and assumed; for messages
   std::optional<PinholeCamera> right;  ///< of a raw pair; baseline_m is 0 then
   TransformRows T_right_left{};        ///< with it
+  TransformRows T_camera_imu{};        ///< of the camera, or the left one
+  double imu_offset_s = 0;             ///< DatasetOptions::time_offset_s
 };
 
 /// Reads the calibration of another program: YAML or JSON of Kalibr (camchain: cam0), OpenVINS, ORB-SLAM2 or

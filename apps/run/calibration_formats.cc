@@ -81,6 +81,25 @@ Calibration OneOfSlam(const CalibrationDocument& file, const CalibrationKeys& ke
   return out;
 }
 
+TransformRows RowsOf(const Pose& T) {
+  const Eigen::Matrix4d matrix = T.Matrix();
+  TransformRows rows{};
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
+  return rows;
+}
+
+// How the IMU is mounted; `camera_key` is T_camera_imu, `imu_key` T_imu_camera, if either is there. Image times
+// plus `shift_key` are the IMU's.
+void TakeImu(const CalibrationKeys& keys, const char* camera_key, const char* imu_key, const char* shift_key,
+             Calibration& out) {
+  if (const KeyValue T = keys.Find({camera_key}))
+    out.T_camera_imu = RowsOf(keys.Transform(T));
+  else if (const KeyValue inverse = keys.Find({imu_key}))
+    out.T_camera_imu = RowsOf(keys.Transform(inverse).Inverse());
+  out.imu_offset_s = -keys.Number({shift_key}).value_or(0);
+}
+
 Pose PoseOfBasalt(const CalibrationKeys& keys) {
   const Eigen::Quaterniond q(keys.Needed({"qw"}), keys.Needed({"qx"}), keys.Needed({"qy"}),
                              keys.Needed({"qz"}));
@@ -111,9 +130,7 @@ void SetRight(const CalibrationKeys& keys, const PinholeCamera& right, const Pos
     keys.Fail(keys.map(), "the two cameras lie " + std::to_string(T_right_left.translation.norm()) +
                               " m apart; are these millimetres? Metres are needed");
   out.right = right;
-  const Eigen::Matrix4d matrix = T_right_left.Matrix();
-  for (std::size_t i = 0; i < out.T_right_left.size(); ++i)
-    out.T_right_left[i] = matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
+  out.T_right_left = RowsOf(T_right_left);
   out.baseline_m = 0;
 }
 
@@ -138,6 +155,7 @@ Calibration FromChain(const CalibrationDocument& file) {
   const CalibrationKeys left = file.At(file[names[0].c_str()]);
   Calibration out = OneCamera(left, "Kalibr");
   if (names.size() > 1) out.format += ", " + names[0] + " of " + std::to_string(names.size());
+  TakeImu(left, "T_cam_imu", "T_imu_cam", "timeshift_cam_imu", out);
   if (!file.pairs || names.size() < 2) return out;
   const CalibrationKeys right = file.At(file[names[1].c_str()]);
   std::optional<Pose> T;
@@ -165,6 +183,7 @@ Calibration FromOrbSlam(const CalibrationDocument& file) {
     TakeRawPairs({stella, "K_left", "D_left", "R_left"}, {stella, "K_right", "D_right", "R_right"},
                  stella.Word({"model"}), file.pairs, out);
   }
+  TakeImu(file, "", file.Has("IMU.T_b_c1") ? "IMU.T_b_c1" : "Tbc", "", out);
   // The pose is that of the right camera in the left one's frame.
   const KeyValue pose = file.Find({"Stereo.T_c1_c2", "Tlr"});
   const CalibrationKeys right = file.At(root, "Camera2.").Or(root, "Camera.");
@@ -195,6 +214,9 @@ Calibration FromVins(const CalibrationDocument& file) {
     return out;
   };
   Calibration out = read("cam0_calib");
+  constexpr double kUnknown = 2;  // estimate_extrinsic: what is given means nothing
+  if (file.Number({"estimate_extrinsic"}).value_or(0) != kUnknown)
+    TakeImu(file, "", "body_T_cam0", "td", out);
   const KeyValue left = file.Find({"body_T_cam0"}), right = file.Find({"body_T_cam1"});
   if (file.pairs && left && right && file["cam1_calib"].IsDefined())
     SetRight(file, read("cam1_calib").camera, file.Transform(right).Inverse() * file.Transform(left), out);
@@ -219,6 +241,9 @@ Calibration FromBasalt(const CalibrationDocument& file) {
   Calibration out = camera(0);
   const std::size_t count = value["intrinsics"].size();
   if (count > 1) out.format += ", the first of " + std::to_string(count) + " cameras";
+  if (const YAML::Node list = value["T_imu_cam"]; list.IsDefined() && list.IsSequence() && list.size() > 0)
+    out.T_camera_imu = RowsOf(PoseOfBasalt(file.At(list[0])).Inverse());
+  out.imu_offset_s = -1e-9 * file.At(value).Number({"cam_time_offset_ns"}).value_or(0);
   if (file.pairs && count > 1) {
     const Pose left = PoseOfBasalt(file.At(element("T_imu_cam", 0)));
     const Pose right = PoseOfBasalt(file.At(element("T_imu_cam", 1)));

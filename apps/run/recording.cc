@@ -101,6 +101,8 @@ std::string SetRequested(const fs::path& dataset, const CameraRequest& request, 
       options.right = calibration.right;
       options.T_right_left = calibration.T_right_left;
     }
+    if (calibration.T_camera_imu != TransformRows{}) options.T_camera_imu = calibration.T_camera_imu;
+    if (calibration.imu_offset_s != 0) options.time_offset_s = calibration.imu_offset_s;
     if (calibration.depth_units_per_m > 0) options.depth_units_per_m = calibration.depth_units_per_m;
     source = request.calibration->filename().string() + ", " + calibration.format;
     SetImageSize(dataset, options, camera);

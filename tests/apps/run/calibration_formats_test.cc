@@ -297,6 +297,26 @@ std::string OrbSlam2Pair(const std::string& R_right) {
          R_right;
 }
 
+TEST(CalibrationFormats, TellsHowTheImuIsMountedAndItsClock) {
+  const TransformRows wanted = {0.28, 0, 0.96, -0.08, 0, 1, 0, 0, -0.96, 0, 0.28, 0.06, 0, 0, 0, 1};
+  const std::string rows = "[[0.28, 0, 0.96, -0.08], [0, 1, 0, 0], [-0.96, 0, 0.28, 0.06], [0, 0, 0, 1]]";
+  const std::string inverse = "[0.28, 0, -0.96, 0.08, 0, 1, 0, 0, 0.96, 0, 0.28, 0.06, 0, 0, 0, 1]";
+  const std::string cam = "intrinsics: [590, 591, 150, 120], resolution: [320, 240]}\n";
+  const std::string slam = "Camera.fx: 590\nCamera.fy: 591\nCamera.cx: 150\nCamera.cy: 120\n";
+  for (const std::string& file :
+       {"cam0: {T_cam_imu: " + rows + ", timeshift_cam_imu: 0.02, " + cam,
+        "cam0: {T_imu_cam: " + inverse + ", timeshift_cam_imu: 0.02, " + cam, slam + "IMU.T_b_c1: " + inverse,
+        slam + "Tbc: {rows: 4, cols: 4, dt: f, data: " + inverse + "}\n",
+        std::string(R"({"value0": {"cam_time_offset_ns": 20000000, "T_imu_cam": [{"px": 0.08, "py": 0, "pz": 0.06,
+           "qx": 0, "qy": -0.6, "qz": 0, "qw": 0.8}], "intrinsics": [{"camera_type": "pinhole", "intrinsics":
+           {"fx": 590, "fy": 591, "cx": 150, "cy": 120}}], "resolution": [[320, 240]]}})")}) {
+    const Calibration c = ReadText(file);
+    for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR(c.T_camera_imu[i], wanted[i], 1e-9) << i << file;
+    EXPECT_NEAR(c.imu_offset_s, file.find("Camera.fx") == std::string::npos ? -0.02 : 0, 1e-12) << file;
+  }
+  EXPECT_EQ(ReadText("cam0: {" + cam).T_camera_imu, TransformRows{});
+}
+
 TEST(CalibrationFormats, OfRawPairsGivesTheRightCameraInEveryFormat) {
   // p_right = R_right^T (R_left p_left - baseline e_x)
   const TransformRows wanted = {0.28, 0, 0.96, -0.08, 0, 1, 0, 0, -0.96, 0, 0.28, 0.06, 0, 0, 0, 1};

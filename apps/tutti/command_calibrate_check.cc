@@ -59,7 +59,8 @@ void CompareWithPoses(const Dataset& dataset, const std::vector<ImuSample>& samp
 }
 
 // The findings of the IMU beside the images; none if there is no IMU.
-std::vector<ImuFinding> CheckImu(const CheckArguments& arguments, const Dataset& dataset) {
+std::vector<ImuFinding> CheckImu(const CheckArguments& arguments, const DatasetOptions& options,
+                                 const Dataset& dataset) {
   std::optional<ImuReport> report = dataset.Imu();
   if (!report) return {};
   std::printf("  %s, median acceleration %.2f m/s^2\n", ImuText(*report).c_str(), report->acceleration_mps2);
@@ -69,7 +70,7 @@ std::vector<ImuFinding> CheckImu(const CheckArguments& arguments, const Dataset&
     std::vector<std::string> notes;
     const Trajectory poses = dataset.ReadGroundTruth(*file, &notes);
     if (HasRotations(poses))
-      CompareWithPoses(dataset, ReadImuFile(FindImu(arguments.dataset)->file), poses, &*report);
+      CompareWithPoses(dataset, ReadImu(*FindImu(arguments.dataset, options.imu_topic)), poses, &*report);
   }
   return report->findings;
 }
@@ -106,7 +107,7 @@ int Check(const CheckArguments& arguments) {
   for (const CalibrationFinding& finding : report.findings)
     std::printf("  can't be right: %s\n    what to do: %s\n", internal::Printable(finding.measured).c_str(),
                 finding.advice.c_str());
-  const std::vector<ImuFinding> imu = CheckImu(arguments, *dataset);
+  const std::vector<ImuFinding> imu = CheckImu(arguments, config.dataset, *dataset);
   for (const ImuFinding& finding : imu)
     std::printf("  the IMU can't be right: %s\n    what to do: %s\n", finding.measured.c_str(),
                 finding.advice.c_str());

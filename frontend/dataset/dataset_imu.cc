@@ -8,6 +8,7 @@
 #include "frontend/dataset/wrapped_dataset.h"
 #include "frontend/imu/imu_examination.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
@@ -23,13 +24,15 @@ class ImuDataset : public WrappedDataset {
   ImuDataset(std::unique_ptr<Dataset> whole, const ImuBeside& imu, const DatasetOptions& options)
       : WrappedDataset(std::move(whole)), warnings_(whole_->Warnings()) {
     try {
-      samples_ = ReadImuFile(imu.file);
+      samples_ = ReadImu(imu);
       report_ = CheckSamples(samples_);
       if (Size() > 0) CheckOverlap(samples_, Stamp(0), Stamp(Size() - 1), &report_);
     } catch (const InputError& error) {  // the images can be used all the same
       report_.findings.push_back({error.what(), "the run goes on without; --no-imu says nothing of it"});
     }
-    std::string text = imu.file.string() + ": " + ImuText(report_);
+    std::string text = imu.file.string() +
+                       (imu.topics.empty() ? ": " : ": " + JoinText(imu.topics, ", ") + ": ") +
+                       ImuText(report_);
     text += imu.calibration.T_camera_imu ? ", mounting known" : ", mounting to be measured";
     warnings_.push_back(text + "; --no-imu leaves it out");
     for (const ImuFinding& finding : report_.findings)
@@ -84,11 +87,8 @@ std::optional<Pose> MountingOf(const ImuBeside& imu, const fs::path& folder, con
 
 std::unique_ptr<Dataset> AddImu(std::unique_ptr<Dataset> whole, const fs::path& folder,
                                 const DatasetOptions& options) {
-  std::error_code code;
-  if (!options.imu || whole->FrameSupply() != Supply::kStored || !whole->Rig().calibrated ||
-      !fs::is_directory(folder, code))
-    return whole;
-  std::optional<ImuBeside> imu = FindImu(folder);
+  if (!options.imu || whole->FrameSupply() != Supply::kStored || !whole->Rig().calibrated) return whole;
+  std::optional<ImuBeside> imu = FindImu(folder, options.imu_topic);
   if (!imu) return whole;
   imu->calibration.T_camera_imu = MountingOf(*imu, folder, whole->Rig(), options);
   imu->calibration.time_offset_s = options.time_offset_s;

@@ -239,4 +239,22 @@ CameraInfo DecodeCameraInfo(const std::string& message, Serialization serializat
   return info;
 }
 
+ImuSample DecodeImuMessage(const std::string& message, Serialization serialization,
+                           const std::string& source) {
+  const std::string problem = SerializationProblem(message, serialization);
+  if (!problem.empty()) throw InputError(source + ": a measurement " + problem);
+  MessageReader in(message, serialization, source + ": a measurement");
+  in.SkipHeader();
+  constexpr int kOrientation = 4, kCovariance = 9;
+  const auto skip = [&](int count) {
+    for (int i = 0; i < count; ++i) in.Get<double>();
+  };
+  ImuSample sample;
+  skip(kOrientation + kCovariance);
+  for (double& value : sample.gyro) value = in.Get<double>();
+  skip(kCovariance);
+  for (double& value : sample.acceleration) value = in.Get<double>();
+  return sample;
+}
+
 }  // namespace tutti

@@ -1,4 +1,4 @@
-// Messages of ROS as they lie in bags: sensor_msgs/Image, CompressedImage, CameraInfo.
+// Messages of ROS as they lie in bags: sensor_msgs/Image, CompressedImage, CameraInfo, Imu.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 
 #include "frontend/dataset/camera_info.h"
 #include "frontend/dataset/image_file.h"
+#include "tutti/core/imu.h"
 
 namespace tutti {
 
@@ -40,5 +41,10 @@ MessageImage DecodeImageMessage(const std::string& message, const std::string& t
 /// `source`: for messages. Throws InputError where the message ends early.
 CameraInfo DecodeCameraInfo(const std::string& message, Serialization serialization,
                             const std::string& source);
+
+/// Angular velocity and acceleration of sensor_msgs/Imu; the stamp is left at 0. Throws InputError where the
+/// message ends early.
+ImuSample DecodeImuMessage(const std::string& message, Serialization serialization,
+                           const std::string& source);
 
 }  // namespace tutti

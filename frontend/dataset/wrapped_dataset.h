@@ -62,9 +62,9 @@ std::unique_ptr<Dataset> TurnFrames(std::unique_ptr<Dataset> stored, int degrees
 std::unique_ptr<Dataset> SelectFrames(std::unique_ptr<Dataset> whole, const DatasetOptions& options,
                                       const std::string& name);
 
-/// The data set with the measurements of the IMU that lies in `folder` beside its images, if there is one, it
-/// is stored, and options.imu. A damaged file is a finding of Dataset::Imu. Throws InputError for a damaged
-/// sensor.yaml.
+/// The data set with the measurements of the IMU that lies in `folder` beside its images, or in the bag, if
+/// there is one, it is stored, and options.imu. A damaged file is a finding of Dataset::Imu. Throws
+/// InputError for a damaged sensor.yaml.
 std::unique_ptr<Dataset> AddImu(std::unique_ptr<Dataset> whole, const std::filesystem::path& folder,
                                 const DatasetOptions& options);
 

@@ -16,6 +16,7 @@
 
 #include "core/byte_stream.h"
 #include "frontend/dataset/camera_info.h"
+#include "tutti/core/imu.h"
 
 namespace tutti::testing {
 
@@ -162,6 +163,16 @@ inline std::string CompressedMessage(const std::vector<unsigned char>& file, con
 }
 
 /// A sensor_msgs/CameraInfo.
+inline std::string ImuMessage(const ImuSample& sample) {
+  internal::ByteWriter out;
+  internal_bag::PutHeader(out, sample.stamp_s);
+  out.Put(std::array<double, 4 + 9>{});  // orientation
+  for (const double value : sample.gyro) out.Put(value);
+  out.Put(std::array<double, 9>{});
+  for (const double value : sample.acceleration) out.Put(value);
+  out.Put(std::array<double, 9>{});
+  return out.Take();
+}
 inline std::string CameraInfoMessage(const CameraInfo& info) {
   internal::ByteWriter out;
   internal_bag::PutHeader(out, 0);

@@ -1,10 +1,15 @@
 // Measurements of an IMU travel with the frames.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "tests/frontend/dataset/dataset_files.h"
+#include "tests/support/bag_writer.h"
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -72,6 +77,59 @@ TEST(DatasetImu, DamagedLeavesTheImagesAsTheyAre) {
   EXPECT_NE(dataset->Imu()->findings[0].measured.find("imu.txt:321"), std::string::npos)
       << dataset->Imu()->findings[0].measured;
   EXPECT_TRUE(FrameOf(*dataset, 3).imu.empty());
+}
+
+// A bag with four images and the measurements of these topics; in "accel" the accelerations alone, at other
+// times.
+fs::path BagWithImu(const std::vector<std::string>& topics) {
+  testing::BagWriter bag;
+  const cv::Mat image(48, 64, CV_8UC1, cv::Scalar(90));
+  bag.Write("/camera/camera_info", "sensor_msgs/CameraInfo",
+            testing::CameraInfoMessage({64, 48}, {60, 0, 32, 0, 60, 24, 0, 0, 1}, "plumb_bob", {}));
+  for (int i = 0; i < 10; ++i)
+    bag.Write("/camera/image", "sensor_msgs/Image", testing::ImageMessage(image, "mono8", 100 + 0.1 * i));
+  for (int i = -20; i < 220; ++i) {
+    for (const std::string& topic : topics) {
+      const bool accel = topic.find("accel") != std::string::npos,
+                 gyro = topic.find("gyro") != std::string::npos;
+      ImuSample sample;
+      sample.stamp_s = 100 + 0.005 * i + (accel ? 0.0025 : 0);
+      if (!accel) sample.gyro = {0.1, 0.2 + 0.001 * (i % 3), 0.3};
+      if (!gyro) sample.acceleration = {0.01 * i, 0, 9.8};
+      bag.Write(topic, "sensor_msgs/Imu", testing::ImuMessage(sample));
+    }
+  }
+  return testing::FreshFile("imu.bag", bag.Finish());
+}
+
+TEST(DatasetImu, OfABagIsItsOnlyTopicOrGyroscopeAndAccelerometer) {
+  for (const std::vector<std::string>& topics :
+       {std::vector<std::string>{"/imu"}, {"/camera/gyro/sample", "/camera/accel/sample"}}) {
+    const std::unique_ptr<Dataset> dataset = OpenDataset(BagWithImu(topics), With(Sensor::kMono));
+    ASSERT_TRUE(dataset->Imu());
+    EXPECT_TRUE(dataset->Imu()->findings.empty()) << dataset->Warnings().back();
+    EXPECT_NEAR(dataset->Imu()->rate_hz, 200, 0.1);
+    const InputFrame frame = FrameOf(*dataset, 3);
+    ASSERT_GE(frame.imu.size(), 19U);
+    const ImuSample& sample = frame.imu[5];
+    EXPECT_NEAR(sample.gyro.x(), 0.1, 1e-12);
+    EXPECT_NEAR(sample.acceleration.x(),
+                0.01 * (sample.stamp_s - 100) / 0.005 - (topics.size() > 1 ? 0.005 : 0), 1e-6);
+  }
+}
+
+TEST(DatasetImu, WhichOfABagIsMeantIsAsked) {
+  const fs::path bag = BagWithImu({"/imu/left", "/imu/right"});
+  DatasetOptions options = With(Sensor::kMono);
+  const std::unique_ptr<Dataset> dataset = OpenDataset(bag, options);
+  EXPECT_TRUE(FrameOf(*dataset, 3).imu.empty()) << "the images can be used all the same";
+  EXPECT_NE(dataset->Warnings().back().find("dataset.imu_topic to one of: /imu/left /imu/right"),
+            std::string::npos)
+      << dataset->Warnings().back();
+  options.imu_topic = "/imu/right";
+  EXPECT_FALSE(FrameOf(*OpenDataset(bag, options), 3).imu.empty());
+  options.imu_topic = "/imu/centre";
+  EXPECT_THAT(testing::ErrorOf([&] { OpenDataset(bag, options); }), ::testing::HasSubstr("/imu/centre"));
 }
 
 TEST(DatasetImu, OfEurocKnowsItsMountingAndNoise) {

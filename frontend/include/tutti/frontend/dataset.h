@@ -89,6 +89,10 @@ struct DatasetOptions {
       bool, imu, true,
       "use the measurements of an IMU that lie beside the images (mav0/imu0, imu.csv, imu.txt), unless "
       "they contradict themselves or the images (--no-imu turns it off)");
+  TUTTI_OPTION(
+      std::string, imu_topic, "",
+      "ROS bag: measurements of the IMU (sensor_msgs/Imu); empty: the bag's only ones, or RealSense's "
+      "two (gyro, accel)");
   TUTTI_OPTION(double, noise, 0,
                "standard deviation of Gaussian noise that is added to the images, to see how a result holds; "
                "0: none",

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 // From Python, whose arrays may change: the map needs the images later.
 InputFrame MakeFrame(const py::object& image, double stamp, std::int64_t index, const py::object& right,
-                     const py::object& depth, const py::object& mask, bool rgb) {
+                     const py::object& depth, const py::object& mask, bool rgb, const py::object& imu) {
   if (image.is_none())
     throw py::type_error(
         "image is None, which cv2.imread returns for a file that it can't read; give an array");
@@ -42,11 +42,17 @@ InputFrame MakeFrame(const py::object& image, double stamp, std::int64_t index, 
   frame.right = ToGrey8(right_view.pixels).clone();
   frame.depth_m = depth_view.pixels.clone();
   frame.mask = mask_view.pixels.clone();
+  if (imu.is_none()) return frame;
+  const py::array_t<double> rows = RowsOf(imu, "imu", {7});
+  const auto at = rows.unchecked<2>();
+  for (py::ssize_t i = 0; i < at.shape(0); ++i)
+    frame.imu.push_back({at(i, 0), {at(i, 1), at(i, 2), at(i, 3)}, {at(i, 4), at(i, 5), at(i, 6)}});
   return frame;
 }
 
 CameraRig MakeRig(const PinholeCamera& camera, const std::string& sensor, double baseline_m, double rate_hz,
-                  double max_depth_m, double readout_s, double depth_delay_s) {
+                  double max_depth_m, double readout_s, double depth_delay_s,
+                  const py::object& T_camera_imu) {
   CameraRig rig;
   rig.camera = camera;
   bool known = false;
@@ -63,6 +69,7 @@ CameraRig MakeRig(const PinholeCamera& camera, const std::string& sensor, double
   rig.max_depth_m = max_depth_m;
   rig.readout_s = readout_s;
   rig.depth_delay_s = depth_delay_s;
+  if (!T_camera_imu.is_none()) rig.imu.emplace().T_camera_imu = PoseOf(T_camera_imu, "T_camera_imu");
   return rig;
 }
 
@@ -154,11 +161,12 @@ void BindFrame(py::module_& module) {
   py::class_<InputFrame>(module, "Frame", doc::InputFrame)
       .def(Pickled<InputFrame>())
       .def(py::init(&MakeFrame), "image"_a, "stamp"_a, "index"_a = 0, py::kw_only(), "right"_a = py::none(),
-           "depth"_a = py::none(), "mask"_a = py::none(), "rgb"_a = false,
+           "depth"_a = py::none(), "mask"_a = py::none(), "rgb"_a = false, "imu"_a = py::none(),
            "From arrays, which are copied; colour becomes grey. Rectified: the rig's camera has no "
            "distortion. image, right: uint8 (H, W) or (H, W, 3), blue, green, red unless rgb. depth: float32 "
            "(H, W) [m], 0 = unknown. mask: uint8 or bool (H, W); there are no features where it is 0. index "
-           "grows.")
+           "grows. imu: (N, 7), an IMU's measurements since the frame before: stamp [s], angular velocity x, "
+           "y, z [rad/s], acceleration x, y, z [m/s^2], with gravity.")
       .def_readonly("index", &InputFrame::index, doc::InputFrame_index)
       .def_readonly("stamp", &InputFrame::stamp_s, doc::InputFrame_stamp_s)
       .def_property_readonly(
@@ -174,6 +182,18 @@ void BindFrame(py::module_& module) {
       .def_property_readonly(
           "mask", [](const InputFrame& frame) { return ArrayOfImage(frame.mask); },
           "uint8 (H, W); there are no features where it is 0. None: everywhere.")
+      .def_property_readonly(
+          "imu",
+          [](const InputFrame& frame) {
+            Eigen::MatrixXd rows(static_cast<Eigen::Index>(frame.imu.size()), 7);
+            for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+              const ImuSample& sample = frame.imu[static_cast<std::size_t>(i)];
+              rows.row(i) << sample.stamp_s, sample.gyro.transpose(), sample.acceleration.transpose();
+            }
+            return ArrayOf(rows);
+          },
+          "(N, 7): stamp [s], angular velocity [rad/s], acceleration [m/s^2] of an IMU since the frame "
+          "before.")
       .def("__repr__", [](const InputFrame& frame) {
         return py::str("Frame(index={}, stamp={}, size={}x{})")
             .format(frame.index, frame.stamp_s, frame.image.cols, frame.image.rows);
@@ -188,8 +208,9 @@ void BindRig(py::module_& module) {
       .def(py::init(&MakeRig), "camera"_a, "sensor"_a = WordOf(defaults.sensor), py::kw_only(),
            "baseline_m"_a = defaults.baseline_m, "rate_hz"_a = defaults.rate_hz,
            "max_depth_m"_a = defaults.max_depth_m, "readout_s"_a = defaults.readout_s,
-           "depth_delay_s"_a = defaults.depth_delay_s,
-           "sensor: mono, stereo or rgbd. The camera is that of rectified images.")
+           "depth_delay_s"_a = defaults.depth_delay_s, "T_camera_imu"_a = py::none(),
+           "sensor: mono, stereo or rgbd. The camera is that of rectified images. T_camera_imu: how an "
+           "IMU is mounted, (4, 4) or x, y, z, qx, qy, qz, qw; None: it is measured.")
       .def_property_readonly(
           "sensor", [](const CameraRig& rig) { return WordOf(rig.sensor); }, "mono, stereo or rgbd")
       .def_readonly("camera", &CameraRig::camera, doc::CameraRig_camera)
@@ -199,6 +220,13 @@ void BindRig(py::module_& module) {
       .def_readonly("readout_s", &CameraRig::readout_s, doc::CameraRig_readout_s)
       .def_readonly("depth_delay_s", &CameraRig::depth_delay_s, doc::CameraRig_depth_delay_s)
       .def_readonly("calibrated", &CameraRig::calibrated, doc::CameraRig_calibrated)
+      .def_property_readonly(
+          "T_camera_imu",
+          [](const CameraRig& rig) -> py::object {
+            if (!rig.imu || !rig.imu->T_camera_imu) return py::none();
+            return ArrayOf(*rig.imu->T_camera_imu);
+          },
+          "(4, 4): from the IMU to the camera; None: not known.")
       .def_property_readonly(
           "T_body_camera", [](const CameraRig& rig) { return ArrayOf(rig.T_body_camera); },
           (std::string("(4, 4): ") + doc::CameraRig_T_body_camera).c_str());

@@ -12,6 +12,7 @@
 #include "core/state_archive.h"
 #include "frontend/store/opencv_state.h"
 #include "tutti/backend/keyframe_graph.h"
+#include "tutti/core/imu.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
@@ -21,9 +22,20 @@
 namespace tutti {
 
 template <class Archive>
+void State(Archive& archive, ImuCalibration& imu) {
+  archive(imu.T_camera_imu, imu.time_offset_s, imu.gyro_noise, imu.gyro_random_walk, imu.acceleration_noise,
+          imu.acceleration_random_walk);
+}
+
+template <class Archive>
+void State(Archive& archive, ImuSample& sample) {
+  archive(sample.stamp_s, sample.gyro, sample.acceleration);
+}
+
+template <class Archive>
 void State(Archive& archive, CameraRig& rig) {
   archive(rig.sensor, rig.camera, rig.baseline_m, rig.T_body_camera, rig.rate_hz, rig.max_depth_m,
-          rig.readout_s, rig.depth_delay_s, rig.calibrated);
+          rig.readout_s, rig.depth_delay_s, rig.calibrated, rig.imu);
 }
 
 template <class Archive>
@@ -52,7 +64,7 @@ void State(Archive& archive, InputFrame& frame) {
     for (int r = 0; r < rows; ++r)
       depth.insert(depth.end(), frame.depth_m.ptr<float>(r), frame.depth_m.ptr<float>(r) + columns);
   }
-  archive(frame.index, frame.stamp_s, frame.image, frame.right, frame.mask, rows, columns, depth);
+  archive(frame.index, frame.stamp_s, frame.image, frame.right, frame.mask, rows, columns, depth, frame.imu);
   if constexpr (Archive::kReading) {
     if (rows < 0 || columns < 0 || std::uint64_t(rows) * std::uint64_t(columns) != depth.size())
       archive.Damaged("a depth image of an impossible size");

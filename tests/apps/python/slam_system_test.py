@@ -114,6 +114,18 @@ def test_frames_from_arrays_are_as_good(stereo):
     assert (a.trajectory() == b.trajectory()).all()
 
 
+def test_frames_carry_the_measurements_of_an_imu(stereo):
+    imu = np.column_stack([np.arange(5) * 0.005, np.tile([0.1, 0.2, 0.3, 0, 0, 9.8], (5, 1))])
+    frame = tutti.Frame(stereo[0].image, 0.02, right=stereo[0].right, imu=imu)
+    assert (frame.imu == imu).all() and (pickle.loads(pickle.dumps(frame)).imu == imu).all()
+    assert stereo[0].imu.shape == (0, 7)
+    mounted = tutti.Rig(stereo.rig.camera, "stereo", baseline_m=0.5, T_camera_imu=[0, 0, 0.1, 0, 0, 0, 1])
+    assert mounted.T_camera_imu[2, 3] == 0.1 and stereo.rig.T_camera_imu is None
+    assert pickle.loads(pickle.dumps(mounted)).T_camera_imu[2, 3] == 0.1
+    with pytest.raises(ValueError, match="imu"):
+        tutti.Frame(stereo[0].image, 0.02, imu=imu[:, :4])
+
+
 def test_a_saved_map_goes_on_and_locates(stereo, tmp_path):
     frames = [stereo[i] for i in range(40)]
     slam = tutti.SlamSystem(stereo.rig, **CONFIG)

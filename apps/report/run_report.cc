@@ -153,6 +153,13 @@ Json FiguresJson(const RunResult& r) {
                     {"k2_sigma", r.lens->k2_sigma},
                     {"steps", r.lens->steps.size()}};
   }
+  if (r.imu)
+    json["imu"] = {{"rate_hz", Rounded(r.imu->rate_hz, 0)},
+                   {"used", r.imu->trusted},
+                   {"findings", r.imu->findings.size()},
+                   {"residual_deg", Rounded(r.imu->residual_deg, 4)},
+                   {"time_offset_ms", Rounded(1000 * r.imu->time_offset_s, 2)},
+                   {"up_sigma_deg", r.imu->up ? Json(Rounded(r.imu->up_sigma_deg, 3)) : Json()}};
   if (r.height)
     json["height"] = {{"measurements", r.height->measurements}, {"corrections", r.height->corrections}};
   if (r.evaluation) {

@@ -463,6 +463,12 @@ std::string ResultTable(const RunResult& r) {
     out << "  the whole map says a focal length of " << Cell(r.focal_length_of_map->camera.fx, 1, " px")
         << ", give or take " << Cell(100 * r.focal_length_of_map->sigma, 1)
         << " %, and is surer than the first frames; for a run with it add\n    --camera " << camera << "\n";
+  if (r.imu && r.imu->trusted) {
+    out << "  the IMU agrees with the images to " << Cell(r.imu->residual_deg, 3)
+        << " deg from frame to frame, its clock is off by " << Cell(1000 * r.imu->time_offset_s, 1) << " ms";
+    if (r.imu->up) out << "; the world's z axis points up, to " << Cell(r.imu->up_sigma_deg, 2) << " deg";
+    out << "\n";
+  }
   if (r.given_odometry && !r.appearance_only && r.LoopsAccepted() > 0 && r.corrections == 0 &&
       r.global_adjustments == 0)
     out << "  all loops agree with the given trajectory within their own uncertainty: it is not changed\n";

@@ -23,6 +23,13 @@ function cardsOf(run) {
   cards.push(card('loops accepted', `${f.accepted} of ${f.proposed}`, judged));
   cards.push(card('time', `${fixed(f.wall_s, 1)} s`, `a pose ${fixed(f.latency_ms, 1)} ms after its image, p99 ${fixed(f.latency_p99_ms, 1)} ms`));
   cards.push(card('memory', `${fixed(f.memory_mb, 0)} MB`, `processor ${fixed(f.cpu_s, 1)} s`));
+  if (f.imu) {
+    const { imu } = f;
+    const says = imu.findings ? 'left out: see Health' : imu.used ? 'agrees with the images' : 'not enough motion to use it';
+    const clock = `clock ${fixed(imu.time_offset_ms, 1)} ms, ${fixed(imu.residual_deg, 3)} deg a frame unexplained`;
+    const up = imu.up_sigma_deg === null ? '' : `; z is up to ${fixed(imu.up_sigma_deg, 2)} deg`;
+    cards.push(card(`IMU, ${imu.rate_hz} Hz`, says, imu.used ? clock + up : ''));
+  }
   if (f.lens) {
     const known = (name) => `${name} ${fixed(f.lens[name], 4)} ± ${fixed(f.lens[`${name}_sigma`], 4)}`;
     cards.push(card('lens, self-calibrated', known('k1'), `${known('k2')}; moved ${f.lens.steps} times`));

@@ -10,7 +10,7 @@ namespace tutti {
 namespace {
 
 constexpr double kWindow_s = 2;
-constexpr double kLongestStep_s = 0.5;  // between frames
+constexpr double kLongestGain_s = 0.5;  // between frames
 constexpr std::size_t kLeastWindows = 3;
 constexpr int kWeightings = 8;
 constexpr double kBiasSigma = 0.3;                  // of an accelerometer, before anything is known [m/s^2]
@@ -40,7 +40,7 @@ void Gravity::Take(const ImuExamination& imu) {
   while (waiting_.size() > 1 && imu.ReachesTo(waiting_[1].stamp_s)) {
     const Frame from = waiting_[0], to = waiting_[1];
     waiting_.pop_front();
-    if (!(to.stamp_s - from.stamp_s <= kLongestStep_s)) continue;
+    if (!(to.stamp_s - from.stamp_s <= kLongestGain_s)) continue;
     if (const auto gained = imu.VelocityGained(from.stamp_s, to.stamp_s))
       steps_.push_back({from, to, *gained});
   }

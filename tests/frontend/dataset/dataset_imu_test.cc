@@ -103,8 +103,8 @@ fs::path BagWithImu(const std::vector<std::string>& topics) {
 }
 
 TEST(DatasetImu, OfABagIsItsOnlyTopicOrGyroscopeAndAccelerometer) {
-  for (const std::vector<std::string>& topics :
-       {std::vector<std::string>{"/imu"}, {"/camera/gyro/sample", "/camera/accel/sample"}}) {
+  using Topics = std::vector<std::string>;
+  for (const Topics& topics : {Topics{"/imu"}, Topics{"/camera/gyro/sample", "/camera/accel/sample"}}) {
     const std::unique_ptr<Dataset> dataset = OpenDataset(BagWithImu(topics), With(Sensor::kMono));
     ASSERT_TRUE(dataset->Imu());
     EXPECT_TRUE(dataset->Imu()->findings.empty()) << dataset->Warnings().back();

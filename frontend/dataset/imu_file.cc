@@ -32,7 +32,8 @@ bool IsBag(const fs::path& path) {
 std::optional<ImuBeside> FindTopics(const fs::path& file, const std::string& topic) {
   ImuBeside found;
   found.file = file;
-  for (const Bag::Topic& each : Bag::Open(file)->topics()) {
+  const std::unique_ptr<Bag> bag = Bag::Open(file);
+  for (const Bag::Topic& each : bag->topics()) {
     if (each.type == kImuMessage && (topic.empty() || each.name == topic)) found.topics.push_back(each.name);
   }
   if (!found.topics.empty()) return found;

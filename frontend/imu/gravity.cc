@@ -116,10 +116,15 @@ void Gravity::Find(const std::map<std::int64_t, Pose>& T_world_camera, bool metr
   const auto covariance = internal::InverseInformation(normal);
   const double length = x.head<3>().norm();
   if (!covariance || !x.allFinite() || !(std::abs(length - kStandard) < kMostOff)) return;
-  const Eigen::Vector3d variances = Eigen::MatrixXd(*covariance).diagonal().head<3>();
-  const double sigma_deg = std::sqrt(variances.maxCoeff()) / length * internal::kDegrees;
+  // Across up, the worst axis: along it, gravity and bias are hard to tell apart, which tilts nothing.
+  const Eigen::Vector3d up = x.head<3>() / length;
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - up * up.transpose();
+  const Eigen::Matrix3d spread = across * Eigen::MatrixXd(*covariance).topLeftCorner<3, 3>() * across;
+  const double sum = spread.trace(), squares = (spread * spread).trace();
+  const double variance = 0.5 * (sum + std::sqrt(std::max(0.0, 2 * squares - sum * sum)));
+  const double sigma_deg = std::sqrt(variance) / length * internal::kDegrees;
   if (!(sigma_deg < kMostSigma_deg)) return;
-  report->up = x.head<3>() / length;
+  report->up = up;
   report->up_sigma_deg = sigma_deg;
   report->gravity_mps2 = length;
   report->acceleration_bias = x.segment<3>(3);

@@ -3,7 +3,7 @@
 
 usage: ./dev bench dense [ROW...] [--write]
 
-`room`, `kinect`, `poses`, `stereo`, `grid`: vertices against the walls of generated worlds of three seeds, with true poses or
+`room`, `kinect`, `poses`, `grid`, `town`: vertices against the walls of generated worlds of three seeds, with true poses or
 (`poses`) with those of `tutti run`, aligned; the worst seed is in brackets. `cost`: a lap integrated once and five times.
 `open3d`: Depth L1 along the rays of every tenth frame, which was left out, of tutti's mesh over that of Open3D's
 ScalableTSDFVolume, same poses and voxels; depth that either does not cover is left out for both, and counted.

@@ -90,6 +90,11 @@ int EndServed(int served) {
 }
 
 bool CanBeServed() {
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+  return false;
+#endif
+#endif
   rlimit files = {};
   return getrlimit(RLIMIT_FSIZE, &files) == 0 && files.rlim_cur == RLIM_INFINITY;
 }

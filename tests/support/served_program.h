@@ -16,7 +16,8 @@ int BeginServed(const std::filesystem::path& program, const std::vector<std::str
 /// Waits for its end, and returns what waitpid says of it.
 int EndServed(int served);
 
-/// Can a copy stand for a new process? Not while files may not grow: copies do not have that limit.
+/// Can a copy stand for a new process? Not while files may not grow: copies do not have that limit; and not
+/// with the thread sanitizer, which lets no copy start threads.
 bool CanBeServed();
 
 }  // namespace tutti::testing

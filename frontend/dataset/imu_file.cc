@@ -91,10 +91,9 @@ std::vector<ImuSample> ReadImuFile(const fs::path& file) {
           " columns; an IMU needs 7: time stamp, angular velocity x, y, z, acceleration x, y, z");
     ImuSample sample;
     sample.stamp_s = stamps[i];
-    for (int k = 0; k < 3; ++k) {
-      sample.gyro[k] = NumberAt(file, lines[i], static_cast<std::size_t>(1 + k));
-      sample.acceleration[k] = NumberAt(file, lines[i], static_cast<std::size_t>(4 + k));
-    }
+    std::size_t column = 1;
+    for (double& value : sample.gyro) value = NumberAt(file, lines[i], column++);
+    for (double& value : sample.acceleration) value = NumberAt(file, lines[i], column++);
     samples.push_back(sample);
   }
   if (samples.size() < 2) throw InputError(file.string() + ": holds no measurements of an IMU");

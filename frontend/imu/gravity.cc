@@ -101,6 +101,7 @@ void Gravity::Find(const std::map<std::int64_t, Pose>& T_world_camera, bool metr
     normal(6, 6) = metric ? 1e6 : 1e-6;  // the scale of a metric map is 1
     right[6] = metric ? 1e6 : 0;
     std::vector<double> misfits;
+    misfits.reserve(windows.size());
     for (const Window& w : windows) {
       Eigen::Matrix<double, 3, 7> by;
       by << Eigen::Matrix3d::Identity(), w.rotation, w.moved;

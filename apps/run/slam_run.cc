@@ -7,6 +7,7 @@
 
 #include "apps/run/camera_clocks.h"
 #include "apps/run/interrupt.h"
+#include "apps/slam/map_reference.h"
 #include "apps/slam/map_state.h"
 #include "apps/slam/trajectory_correction.h"
 #include "frontend/odometry/odometry_file.h"
@@ -206,10 +207,8 @@ void SlamRun::Collect() {
   if (!alone_) return;
   const Odometry& alone = alone_->Tracked();
   Trajectory poses = FrameTrajectory(alone.map(), -1, session);
-  const std::optional<ImuReport> imu = alone.Report().imu;
-  if (imu && imu->up) {  // its world has its z axis upwards, too
-    const Pose upright(Eigen::Quaterniond::FromTwoVectors(*imu->up, Eigen::Vector3d::UnitZ()), {0, 0, 0});
-    for (StampedPose& pose : poses) pose.pose = upright * pose.pose;
+  if (const std::optional<Pose> upright = UprightTurn(alone)) {  // as that of the map
+    for (StampedPose& pose : poses) pose.pose = *upright * pose.pose;
   }
   result_.trajectory_odometry = BodyTrajectory(poses, result_.rig);
 }

@@ -45,4 +45,11 @@ std::map<int, Similarity> InFrameOf(const Map& first, int first_keyframe, const 
   return S_first_keyframe;
 }
 
+std::optional<Pose> UprightTurn(const Odometry& odometry) {
+  const std::optional<ImuReport> imu = odometry.Report().imu;
+  if (!imu || !imu->up) return std::nullopt;
+  return Pose(Eigen::Quaterniond::FromTwoVectors(*imu->up, Eigen::Vector3d::UnitZ()),
+              Eigen::Vector3d::Zero());
+}
+
 }  // namespace tutti

@@ -1,10 +1,12 @@
-// The frame of reference that a map has after it was merged into another one.
+// Frames of reference: of a map that was merged into another one, and one whose z axis points up.
 #pragma once
 
 #include <map>
+#include <optional>
 
 #include "tutti/core/pose.h"
 #include "tutti/frontend/map.h"
+#include "tutti/frontend/odometry.h"
 
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
@@ -14,6 +16,10 @@ namespace tutti {
 /// of `first` is where it was. One camera: what that one sees is as far away as it was. Pieces without
 /// keyframes of `first` stay where they are.
 std::map<int, Similarity> InFrameOf(const Map& first, int first_keyframe, const Map& merged);
+
+/// The rotation that turns an odometry's world so that its z axis points up; none: no IMU knows where that
+/// is.
+std::optional<Pose> UprightTurn(const Odometry& odometry);
 
 }  // namespace tutti
 #pragma GCC visibility pop

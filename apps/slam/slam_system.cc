@@ -236,14 +236,11 @@ class SlamSystem::Impl {
   // The world's z axis points up if an IMU knows where that is.
   void StandUpright() {
     constexpr double kUpright = 0.002;  // it is, no matter what a loop more says [rad]
-    const std::optional<ImuReport> imu = odometry_->Report().imu;
-    if (!imu || !imu->up) return;
-    const auto turn = Eigen::Quaterniond::FromTwoVectors(*imu->up, Eigen::Vector3d::UnitZ());
-    if (turn.angularDistance(Eigen::Quaterniond::Identity()) < kUpright) return;
+    const std::optional<Pose> turn = UprightTurn(*odometry_);
+    if (!turn || turn->rotation.angularDistance(Eigen::Quaterniond::Identity()) < kUpright) return;
     std::map<int, Similarity> upright;
     for (const int id : odometry_->map().KeyframeIds()) {
-      const Pose T = Pose(turn, Eigen::Vector3d::Zero()) * odometry_->map().keyframe(id).T_world_camera;
-      upright[id] = Similarity(T);
+      upright[id] = Similarity(*turn * odometry_->map().keyframe(id).T_world_camera);
     }
     MapMerge::MoveAll(upright, &loops_, &*odometry_);
   }

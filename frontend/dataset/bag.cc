@@ -66,6 +66,11 @@ class PartedBag : public Bag {
 
 }  // namespace
 
+bool Bag::IsNamed(const fs::path& file) {
+  const auto endings = {".bag", ".mcap", ".db3", ".zstd"};
+  return std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end();
+}
+
 std::vector<fs::path> Bag::Files(const fs::path& folder) {
   std::vector<std::string> names;
   std::error_code error;

@@ -43,6 +43,8 @@ class Bag {
   /// in which 'ros2 bag record' leaves such files, which are read one after the other. Throws InputError
   /// where it can't be opened, or is none of these.
   static std::unique_ptr<Bag> Open(const std::filesystem::path& path);
+  /// By its name: .bag, .mcap, .db3, or a packed one (.zstd), which Open refuses with a sentence.
+  static bool IsNamed(const std::filesystem::path& file);
   /// The files of such a folder, in the order of their numbers, also packed ones (.db3.zstd) that lie there
   /// alone; empty: it is none.
   static std::vector<std::filesystem::path> Files(const std::filesystem::path& folder);

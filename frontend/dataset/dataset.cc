@@ -175,9 +175,7 @@ DatasetType DetectDatasetType(const fs::path& path) {
   if (!fs::is_directory(path, code)) {
     if (HasImageExtension(path))
       throw InputError(path.string() + ": is a single image; give the folder that holds it");
-    const std::string type = path.extension().string();
-    const auto bags = {".bag", ".mcap", ".db3", ".zstd"};  // the last one: packed, which Bag::Open says
-    return std::find(bags.begin(), bags.end(), type) != bags.end() ? DatasetType::kBag : DatasetType::kVideo;
+    return Bag::IsNamed(path) ? DatasetType::kBag : DatasetType::kVideo;
   }
   if (const std::optional<DatasetType> type = FolderType(path)) return *type;
   const fs::directory_iterator entries(path, code);

@@ -22,13 +22,6 @@ namespace {
 
 constexpr const char* kImuMessage = "sensor_msgs/Imu";
 
-bool IsBag(const fs::path& path) {
-  std::error_code code;
-  if (fs::is_directory(path, code)) return !Bag::Files(path).empty();
-  const std::string extension = path.extension().string();
-  return extension == ".bag" || extension == ".mcap" || extension == ".db3" || extension == ".zstd";
-}
-
 std::optional<ImuBeside> FindTopics(const fs::path& file, const std::string& topic) {
   ImuBeside found;
   found.file = file;
@@ -49,7 +42,7 @@ std::vector<ImuSample> ReadTopic(const Bag& bag, const std::string& topic) {
       ImuSample sample = DecodeImuMessage(bytes, bag.Find(topic)->serialization, topic);
       MessageHead head = {};
       std::memcpy(head.data(), bytes.data(), sizeof head);
-      sample.stamp_s = std::isnan(message.stamp_s) ? StampOf(head) : message.stamp_s;  // packed for itself
+      sample.stamp_s = StampOf(head);
       samples.push_back(sample);
     } catch (const InputError&) {  // how many are missing, the rate tells
     }
@@ -118,8 +111,9 @@ std::vector<ImuSample> ReadImu(const ImuBeside& imu) {
 }
 
 std::optional<ImuBeside> FindImu(const fs::path& dataset, const std::string& topic) {
-  if (IsBag(dataset)) return FindTopics(dataset, topic);
   std::error_code code;
+  const bool is_bag = fs::is_directory(dataset, code) ? !Bag::Files(dataset).empty() : Bag::IsNamed(dataset);
+  if (is_bag) return FindTopics(dataset, topic);
   for (const char* name : {"mav0/imu0/data.csv", "imu0/data.csv", "imu.csv", "imu.txt"}) {
     if (!fs::is_regular_file(dataset / name, code)) continue;
     ImuBeside found;

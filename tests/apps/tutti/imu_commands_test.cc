@@ -24,6 +24,11 @@ using ::testing::Not;
 using testing::ReadAll;
 using testing::RunTutti;
 
+// Of the body; world z is up.
+Eigen::Quaterniond TurnedOnTheWay(double t) {
+  return ExpSO3({0, 0, 0.3 * t}) * ExpSO3({0.15 * std::sin(1.7 * t), 0.15 * std::sin(2.3 * t), 0});
+}
+
 // Twelve seconds in a room, looking ahead, with a BMI055.
 class RenderedFlight : public ::testing::Test {
  protected:
@@ -40,8 +45,7 @@ class RenderedFlight : public ::testing::Test {
     std::ofstream path(root / "body.tum");
     for (int i = 0; i <= 240; ++i) {
       const double t = 0.05 * i;
-      const Eigen::Quaterniond q =
-          ExpSO3({0, 0, 0.3 * t}) * ExpSO3({0.15 * std::sin(1.7 * t), 0.15 * std::sin(2.3 * t), 0});
+      const Eigen::Quaterniond q = TurnedOnTheWay(t);
       path << 100 + t << ' ' << std::sin(0.5 * t) << ' ' << 0.8 * std::cos(0.4 * t) << ' '
            << 1.4 + 0.3 * std::sin(0.9 * t) << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w()
            << '\n';
@@ -69,8 +73,7 @@ TEST_F(RenderedFlight, TheRunSaysWhatTheImuDidAndItsWorldIsUpright) {
     const Trajectory poses = ReadTrajectory(out / file, TrajectoryFormat::kTum);
     ASSERT_GT(poses.size(), 150U) << file;
     const double t = poses.back().stamp_s - 100;
-    const Eigen::Quaterniond truth =
-        ExpSO3({0, 0, 0.3 * t}) * ExpSO3({0.15 * std::sin(1.7 * t), 0.15 * std::sin(2.3 * t), 0});
+    const Eigen::Quaterniond truth = TurnedOnTheWay(t);
     const Eigen::Vector3d up = poses.back().pose.rotation * (truth.conjugate() * Eigen::Vector3d::UnitZ());
     EXPECT_LT(std::acos(std::min(1.0, up.z())) * internal::kDegrees, 1) << file;
   }

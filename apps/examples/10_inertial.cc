@@ -4,7 +4,6 @@
 //
 //   tutti generate --out flight --sensor stereo --trajectory body.tum --imu bmi055     # data to try it with
 #include <cstdio>
-#include <deque>
 #include <exception>
 #include <fstream>
 #include <memory>
@@ -16,28 +15,26 @@
 
 namespace {
 
-// Stands for a driver: rad/s and m/s^2 with gravity, stamps by the camera's clock [s].
-std::deque<tutti::ImuSample> Measurements(const std::string& file) {
-  std::deque<tutti::ImuSample> samples;
+// Stands for a driver's thread: rad/s and m/s^2 with gravity, stamps by the camera's clock [s].
+void Drive(const std::string& file, tutti::ImuBuffer* measurements) {
   std::ifstream in(file);
   tutti::ImuSample s;
   while (in >> s.stamp_s >> s.gyro.x() >> s.gyro.y() >> s.gyro.z() >> s.acceleration.x() >>
          s.acceleration.y() >> s.acceleration.z())
-    samples.push_back(s);
-  return samples;
+    measurements->Push(s);
 }
 
 int Run(const std::string& config_file, const std::string& folder, const std::string& imu_file) {
   tutti::RunConfig config = tutti::LoadConfig(config_file);
   config.dataset.imu = false;  // we bring our own
   const std::unique_ptr<tutti::Dataset> dataset = tutti::OpenDataset(folder, config.dataset);
-  std::deque<tutti::ImuSample> waiting = Measurements(imu_file);
+  tutti::ImuBuffer measurements;
+  Drive(imu_file, &measurements);
   tutti::SlamSystem slam(config, dataset->Rig());  // the mounting is measured; CameraRig::imu would tell it
   for (std::size_t i = 0; i < dataset->Size(); ++i) {
     tutti::ReadResult read = dataset->Read(i);
     if (!read.frame) continue;
-    for (; !waiting.empty() && waiting.front().stamp_s <= read.frame->stamp_s; waiting.pop_front())
-      read.frame->imu.push_back(waiting.front());
+    read.frame->imu = measurements.TakeUntil(read.frame->stamp_s);
     slam.Track(*read.frame);
   }
   slam.Finish();

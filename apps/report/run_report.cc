@@ -1,11 +1,13 @@
 #include "apps/report/run_report.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/report/report_parts.h"
 #include "apps/run/outputs.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
+#include "core/numbers.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/version.h"
@@ -173,6 +175,43 @@ Json FiguresJson(const RunResult& r) {
   return json;
 }
 
+Json ThreeJson(const Eigen::Vector3d& v, int decimals) {
+  return {Rounded(v.x(), decimals), Rounded(v.y(), decimals), Rounded(v.z(), decimals)};
+}
+
+// What an IMU's examination found, over the time since the first of what is compared.
+Json ImuSeriesJson(const RunResult& result) {
+  if (!result.imu) return Json();
+  const ImuReport& imu = *result.imu;
+  Json json = {{"findings", Json::array()},
+               {"turns", Json::array()},
+               {"moments", Json::array()},
+               {"tilts", Json::array()},
+               {"noise", Json()}};
+  for (const ImuFinding& finding : imu.findings)
+    json["findings"].push_back(finding.measured + "; " + finding.advice);
+  const double begin = result.trajectory.empty() ? 0 : result.trajectory.front().stamp_s;
+  for (const ImuTurn& turn : imu.turns)
+    json["turns"].push_back({Rounded(turn.stamp_s - begin, 3), Rounded(turn.camera_deg_s, 2),
+                             Rounded(turn.gyro_deg_s, 2), Rounded(turn.apart_deg, 4)});
+  for (const ImuMoment& moment : imu.moments)
+    json["moments"].push_back({{"t", Rounded(moment.stamp_s - begin, 2)},
+                               {"bias", ThreeJson(moment.gyro_bias, 5)},
+                               {"offset_ms", Rounded(1000 * moment.time_offset_s, 2)},
+                               {"residual_deg", Rounded(moment.residual_deg, 4)}});
+  for (const ImuTilt& tilt : imu.tilts) {
+    const double cosine = imu.up ? std::clamp(tilt.up.dot(*imu.up), -1.0, 1.0) : 1;
+    json["tilts"].push_back(
+        {Rounded(tilt.stamp_s - begin, 2), Rounded(std::acos(cosine) * internal::kDegrees, 3)});
+  }
+  if (imu.noise)
+    json["noise"] = {{"rest_s", imu.noise->rest_s},
+                     {"tau_s", imu.noise->tau_s},
+                     {"gyro", imu.noise->gyro},
+                     {"acceleration", imu.noise->acceleration}};
+  return json;
+}
+
 // Stages and frame times.
 Json TimingJson(const RunResult& result) {
   Json stages = Json::array();
@@ -217,7 +256,9 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["variant"] = variant;
   json["dataset"] = result.dataset;
   json["seed"] = result.config.loops.seed;
-  json["unit"] = result.rig.sensor == Sensor::kMono && !scored ? "map units" : "m";
+  const bool has_metres =
+      scored || (result.imu && result.imu->metres > 0 && result.imu->metres_sigma < kMostScaleSigma);
+  json["unit"] = result.rig.sensor == Sensor::kMono && !has_metres ? "map units" : "m";
   json["figures"] = FiguresJson(result);
   json["findings"] = Json::array();
   for (const CalibrationFinding& finding : result.calibration_findings)
@@ -240,6 +281,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["posterior"] = PosteriorJson(result, log, loops);
   json["gallery"] = GalleryJson(result, loops);
   json["timing"] = TimingJson(result);
+  json["imu"] = ImuSeriesJson(result);
   json["configuration"] = ConfigurationJson(result);
   return json;
 }

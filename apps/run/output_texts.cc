@@ -173,6 +173,8 @@ Json ImuJson(const ImuReport& imu) {
                        {"up", vector(*imu.up)},
                        {"up_sigma_deg", imu.up_sigma_deg},
                        {"acceleration_bias_mps2", vector(imu.acceleration_bias)}};
+  if (imu.metres > 0)
+    json["gravity"].update({{"map_unit_m", imu.metres}, {"map_unit_sigma", imu.metres_sigma}});
   return json;
 }
 
@@ -467,6 +469,8 @@ std::string ResultTable(const RunResult& r) {
     out << "  the IMU agrees with the images to " << Cell(r.imu->residual_deg, 3)
         << " deg from frame to frame, its clock is off by " << Cell(1000 * r.imu->time_offset_s, 1) << " ms";
     if (r.imu->up) out << "; the world's z axis points up, to " << Cell(r.imu->up_sigma_deg, 2) << " deg";
+    if (r.imu->metres > 0 && r.imu->metres_sigma < kMostScaleSigma)
+      out << "; its unit is the metre, to " << Cell(100 * r.imu->metres_sigma, 1) << " %";
     out << "\n";
   }
   if (r.given_odometry && !r.appearance_only && r.LoopsAccepted() > 0 && r.corrections == 0 &&

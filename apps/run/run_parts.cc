@@ -177,6 +177,7 @@ void CollectMap(const RunState& state, RunResult& result) {
     result.imu->missing_share = file.missing_share;
     result.imu->longest_gap_s = file.longest_gap_s;
     result.imu->acceleration_mps2 = file.acceleration_mps2;
+    result.imu->noise = file.noise;
   }
   result.map_figures = MeasureMap(odometry, session);
   CollectKeyframes(odometry, session, result);

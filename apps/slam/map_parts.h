@@ -16,7 +16,7 @@
 namespace tutti {
 
 inline constexpr internal::SectionFileKind kMapFile = {
-    {'T', 'U', 'T', 'T', 'I', 'M', 'A', 'P'}, 19, "map", "tutti run or SlamSystem::Save"};
+    {'T', 'U', 'T', 'T', 'I', 'M', 'A', 'P'}, 20, "map", "tutti run or SlamSystem::Save"};
 
 /// Sections of SlamSystem itself; the detector's are below 100, the odometry's from 100 to 199, those of
 /// whoever called it from 300 on, at the end.

@@ -233,16 +233,17 @@ class SlamSystem::Impl {
     SubmapJoiner(config_, frames_, &loops_, &*odometry_).Join();
   }
 
-  // The world's z axis points up if an IMU knows where that is.
+  // The world's z axis points up if an IMU knows where that is; one camera's unit is the metre if it knows
+  // it.
   void StandUpright() {
-    constexpr double kUpright = 0.002;  // it is, no matter what a loop more says [rad]
-    const std::optional<Pose> turn = UprightTurn(*odometry_);
-    if (!turn || turn->rotation.angularDistance(Eigen::Quaterniond::Identity()) < kUpright) return;
-    std::map<int, Similarity> upright;
-    for (const int id : odometry_->map().KeyframeIds()) {
-      upright[id] = Similarity(*turn * odometry_->map().keyframe(id).T_world_camera);
-    }
-    MapMerge::MoveAll(upright, &loops_, &*odometry_);
+    constexpr double kUpright = 0.002;  // it is, no matter what a loop more says [rad], [1]
+    const std::optional<Similarity> turn = UprightTurn(*odometry_);
+    if (!turn) return;
+    const bool is = turn->rotation.angularDistance(Eigen::Quaterniond::Identity()) < kUpright &&
+                    std::abs(turn->scale - 1) < kUpright;
+    if (is) return;
+    const Map& map = odometry_->map();
+    MapMerge::MoveAll(Upright(map, *odometry_->Report().imu, *turn, loops_.Graph(map)), &loops_, &*odometry_);
   }
 
   // What is due by now.

@@ -64,6 +64,9 @@ std::vector<ImuFinding> CheckImu(const CheckArguments& arguments, const DatasetO
   std::optional<ImuReport> report = dataset.Imu();
   if (!report) return {};
   std::printf("  %s, median acceleration %.2f m/s^2\n", ImuText(*report).c_str(), report->acceleration_mps2);
+  if (report->noise)
+    std::printf("    at rest for %.1f s: noise %.2g rad/s/sqrt(Hz), %.2g m/s^2/sqrt(Hz), of the worst axis\n",
+                report->noise->rest_s, report->noise->gyro_density, report->noise->acceleration_density);
   std::optional<std::filesystem::path> file = dataset.GroundTruthFile();
   if (!arguments.poses.empty()) file = arguments.poses;
   if (report->findings.empty() && file) {

@@ -18,7 +18,7 @@ namespace tutti {
 /// with R_i the camera's rotations, a_i what each step from frame to frame gained of velocity
 /// (ImuExamination::VelocityGained), g u gravity's counterpart, v the velocities that the poses say, s the
 /// scale of one camera's map, and b the accelerometer's bias. It is linear in g u, b and s: least squares
-/// over all windows, with weights that fall with the misfit (Cauchy). Value type.
+/// over all windows, with weights that fall with the misfit (Cauchy), at last with g known. Value type.
 class Gravity {
  public:
   /// A frame came, at this time by the camera's clock.
@@ -26,8 +26,8 @@ class Gravity {
   /// What was measured up to the frames that came, as far as the IMU is trusted and its measurements are
   /// there.
   void Take(const ImuExamination& imu);
-  /// Adds up, length and bias to the report if the windows tell: by the poses T_world_camera that the frames
-  /// have now. `metric`: in metres.
+  /// Adds up, length, bias, each window's tilt and the unit of one camera's map to the report if the windows
+  /// tell: by the poses T_world_camera that the frames have now. `metric`: in metres.
   void Find(const std::map<std::int64_t, Pose>& T_world_camera, bool metric, ImuReport* report) const;
   /// False for numbers from a damaged file.
   bool IsPossible() const;

@@ -212,6 +212,7 @@ void ImuExamination::Judge(const Fit& fit) {
   const bool clear = report_.findings.empty();
   const bool known = report_.R_camera_imu && report_.time_offset_sigma_s < kKnownOffset;
   report_.trusted = clear && known && fit.Agreement() >= kTurnsAgree;
+  report_.moments.push_back({steps_.back().to_s, report_.residual_deg, fit.offset_s, fit.bias});
 }
 
 // The mounting is measured where the camera turned about two axes; else the calibration is believed.
@@ -267,6 +268,20 @@ std::optional<Eigen::Quaterniond> ImuExamination::CameraTurn(double from_s, doub
   if (!turned) return std::nullopt;
   const Eigen::Quaterniond R = *report_.R_camera_imu;
   return (R * turned->conjugate() * R.conjugate()).normalized();
+}
+
+std::vector<ImuTurn> ImuExamination::Turns() const {
+  std::vector<ImuTurn> turns;
+  if (!report_.R_camera_imu) return turns;
+  for (const Step& step : steps_) {
+    const double offset = report_.time_offset_s, dt = step.to_s - step.from_s;
+    const auto turned = track_.Turned(step.from_s - offset, step.to_s - offset, report_.gyro_bias);
+    if (!turned) continue;
+    const Eigen::Vector3d gyro = *report_.R_camera_imu * LogSO3(*turned);
+    turns.push_back({step.to_s, step.turn.norm() / dt * internal::kDegrees,
+                     gyro.norm() / dt * internal::kDegrees, (step.turn - gyro).norm() * internal::kDegrees});
+  }
+  return turns;
 }
 
 std::optional<Eigen::Vector3d> ImuExamination::VelocityGained(double from_s, double to_s) const {

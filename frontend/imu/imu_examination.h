@@ -20,10 +20,14 @@ void State(Archive& archive, ImuFinding& finding) {
   archive(finding.measured, finding.advice);
 }
 template <class Archive>
+void State(Archive& archive, ImuMoment& m) {
+  archive(m.stamp_s, m.residual_deg, m.time_offset_s, m.gyro_bias);
+}
+template <class Archive>
 void State(Archive& archive, ImuReport& r) {
   archive(r.samples, r.rate_hz, r.duration_s, r.missing_share, r.longest_gap_s, r.acceleration_mps2, r.steps,
           r.turned_deg, r.agreement, r.residual_deg, r.R_camera_imu, r.mounting_sigma_deg, r.time_offset_s,
-          r.time_offset_sigma_s, r.gyro_bias, r.trusted, r.findings);
+          r.time_offset_sigma_s, r.gyro_bias, r.moments, r.trusted, r.findings);
 }
 
 /// Compares the gyroscope with the turning of a camera, frame by frame: the rotation R_camera_imu, the bias
@@ -47,6 +51,8 @@ class ImuExamination {
 
   /// Of what was compared so far; CheckSamples has the rest.
   const ImuReport& report() const { return report_; }
+  /// How the two turned, for each step that is kept; none before the mounting is known.
+  std::vector<ImuTurn> Turns() const;
   /// R_to_from of the camera between two times, if the IMU is trusted and has measured all the while.
   std::optional<Eigen::Quaterniond> CameraTurn(double from_s, double to_s) const;
   /// What the IMU gained of velocity between two times, with gravity, in its axes at the first one [m/s]; if
@@ -96,8 +102,8 @@ class ImuExamination {
   ImuReport report_;
 };
 
-/// Rate, gaps, order, stuck values, and the unit of the accelerations; of a whole recording. Findings have a
-/// remedy each.
+/// Rate, gaps, order, stuck values, the unit of the accelerations, and noise at rest; of a whole recording.
+/// Findings have a remedy each.
 ImuReport CheckSamples(const std::vector<ImuSample>& samples);
 
 /// As snprintf.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
+#include <utility>
 
 #include "core/numbers.h"
 
@@ -83,6 +84,70 @@ void CheckAccelerations(const std::vector<ImuSample>& samples, ImuReport* report
   }
 }
 
+// The longest part at rest, as [first, end): half seconds whose values scatter and whose means differ no more
+// than noise and a draught do.
+std::pair<std::size_t, std::size_t> LongestRest(const std::vector<ImuSample>& samples, std::size_t chunk) {
+  constexpr double kGyro = 0.02, kAcceleration = 0.2;  // [rad/s], [m/s^2]
+  using Six = Eigen::Matrix<double, 6, 1>;
+  const Six most =
+      (Six() << Eigen::Vector3d::Constant(kGyro), Eigen::Vector3d::Constant(kAcceleration)).finished();
+  std::pair<std::size_t, std::size_t> longest(0, 0);
+  Six before = Six::Zero();
+  for (std::size_t first = 0, at = 0; at + chunk <= samples.size(); at += chunk) {
+    Six sum = Six::Zero(), squares = Six::Zero();
+    for (std::size_t i = at; i < at + chunk; ++i) {
+      const Six value = (Six() << samples[i].gyro, samples[i].acceleration).finished();
+      sum += value;
+      squares += value.cwiseAbs2();
+    }
+    const Six mean = sum / static_cast<double>(chunk);
+    const Six variance = squares / static_cast<double>(chunk) - mean.cwiseAbs2();
+    const bool still = (variance.array() <= most.array().square()).all();
+    if (!still)
+      first = at + chunk;
+    else if (at > first && !((mean - before).cwiseAbs().array() <= 0.5 * most.array()).all())
+      first = at;
+    before = mean;
+    if (at + chunk > first && at + chunk - first > longest.second - longest.first)
+      longest = {first, at + chunk};
+  }
+  return longest;
+}
+
+// Allan deviation of the worst of three axes for means over `length` samples, overlapping.
+double AllanDeviation(const std::vector<Eigen::Vector3d>& sums, std::size_t length) {
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  std::size_t count = 0;
+  for (std::size_t i = 0; i + 2 * length < sums.size(); ++i, ++count)
+    squares += (sums[i + 2 * length] - 2 * sums[i + length] + sums[i]).cwiseAbs2();
+  return std::sqrt(0.5 * squares.maxCoeff() / static_cast<double>(std::max<std::size_t>(1, count))) /
+         static_cast<double>(length);
+}
+
+std::optional<ImuNoise> NoiseAtRest(const std::vector<ImuSample>& samples, double rate_hz) {
+  constexpr double kLeast_s = 10, kChunk_s = 0.5;
+  const auto chunk = static_cast<std::size_t>(std::lround(kChunk_s * rate_hz));
+  if (chunk < 2) return std::nullopt;
+  const auto [first, end] = LongestRest(samples, chunk);
+  ImuNoise noise;
+  noise.rest_s = static_cast<double>(end - first) / rate_hz;
+  if (!(noise.rest_s >= kLeast_s)) return std::nullopt;
+  std::vector<Eigen::Vector3d> gyro(1, Eigen::Vector3d::Zero()), acceleration = gyro;
+  for (std::size_t i = first; i < end; ++i) {
+    gyro.push_back(gyro.back() + samples[i].gyro - samples[first].gyro);
+    acceleration.push_back(acceleration.back() + samples[i].acceleration - samples[first].acceleration);
+  }
+  for (std::size_t length = 1; 4 * length <= end - first; length *= 2) {
+    noise.tau_s.push_back(static_cast<double>(length) / rate_hz);
+    noise.gyro.push_back(AllanDeviation(gyro, length));
+    noise.acceleration.push_back(AllanDeviation(acceleration, length));
+  }
+  const auto second = static_cast<std::size_t>(std::lround(rate_hz));  // where the deviation is the density
+  noise.gyro_density = AllanDeviation(gyro, second);
+  noise.acceleration_density = AllanDeviation(acceleration, second);
+  return noise;
+}
+
 }  // namespace
 
 std::string FormattedText(const char* format, ...) {
@@ -107,6 +172,7 @@ ImuReport CheckSamples(const std::vector<ImuSample>& samples) {
     report.findings.push_back({FormattedText("it is stuck: for %.1f s all values are the same", stuck),
                                "look at its cable and driver; no sensor is without noise"});
   CheckAccelerations(samples, &report);
+  if (stuck <= kStuck_s) report.noise = NoiseAtRest(samples, report.rate_hz);
   return report;
 }
 

@@ -307,6 +307,7 @@ OdometryReport Odometry::Impl::Report() const {
   report.clocks = clocks_.Found();
   if (!imu_.empty()) {
     report.imu = imu_.report();
+    report.imu->turns = imu_.Turns();
     const Trajectory poses = FrameTrajectory(map());
     const std::vector<std::int64_t> numbers = FrameIndices(map());
     std::map<std::int64_t, Pose> T_world_camera;

@@ -10,6 +10,7 @@ const TABS = [
   ['recall', 'Precision-recall', drawRecall, missingRecall],
   ['posterior', 'Posterior', drawPosterior, missingPosterior],
   ['gallery', 'Gallery', drawGallery, missingGallery],
+  ['imu', 'IMU', drawImu, missingImu],
   ['timing', 'Timing', drawTiming, () => ''],
   ['configuration', 'Configuration', drawConfiguration, () => ''],
 ];

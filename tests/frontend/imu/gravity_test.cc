@@ -88,6 +88,21 @@ TEST(Gravity, OneCamerasMapNeedsNoMetres) {
   flown.gravity.Find(flown.T_world_camera, false, &report);
   ASSERT_TRUE(report.up);
   EXPECT_LT(Off_deg(*report.up), 0.1);
+  EXPECT_NEAR(report.metres, 7.3, 0.01 * 7.3);
+  EXPECT_LT(report.metres_sigma, 0.02);
+  EXPECT_GT(report.metres_sigma, std::abs(report.metres / 7.3 - 1) / 4);
+}
+
+TEST(Gravity, EachWindowSaysWhereUpIs) {
+  const Flown flown = Fly(30, 1);
+  ImuReport report = flown.report;
+  flown.gravity.Find(flown.T_world_camera, true, &report);
+  EXPECT_GE(report.tilts.size(), 12U);
+  EXPECT_EQ(report.metres, 0) << "of a metric map it is not asked";
+  for (const ImuTilt& tilt : report.tilts) {
+    EXPECT_LT(Off_deg(tilt.up), 1);
+    EXPECT_NEAR(tilt.stamp_s, 1 + 0.05 * static_cast<double>(tilt.frame), 1e-6);
+  }
 }
 
 TEST(Gravity, AMapInTheWrongUnitDoesNotTiltTheWorldUnsaid) {

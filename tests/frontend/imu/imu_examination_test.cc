@@ -70,6 +70,20 @@ ImuCalibration Mounted() {
   return known;
 }
 
+TEST(ImuExamination, SaysWhatItFoundOnTheWay) {
+  const ImuExamination examination = Examined(RecordTurns(30));
+  const std::vector<ImuTurn> turns = examination.Turns();
+  ASSERT_GT(turns.size(), 500U);
+  for (const ImuTurn& turn : turns) {
+    EXPECT_NEAR(turn.camera_deg_s, turn.gyro_deg_s, 0.1);
+    EXPECT_LT(turn.apart_deg, 0.01);
+  }
+  const std::vector<ImuMoment> moments = examination.report().moments;
+  ASSERT_GT(moments.size(), 8U);
+  EXPECT_LT((moments.back().gyro_bias - kBias).norm(), 1e-3);
+  EXPECT_LT(moments.front().stamp_s, moments.back().stamp_s);
+}
+
 TEST(ImuExamination, FindsMountingBiasAndTimeOffsetOfAnUnknownImu) {
   for (const double late_s : {0.0, 0.005, 0.02, 0.05}) {
     const ImuExamination examination = Examined(RecordTurns(20, late_s));

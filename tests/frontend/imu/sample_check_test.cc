@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "frontend/dataset/imu_file.h"
 #include "tests/support/test_data.h"
@@ -35,6 +36,29 @@ TEST(CheckSamples, HasNothingAgainstASoundImu) {
   EXPECT_NEAR(report.rate_hz, 200, 0.01);
   EXPECT_NEAR(report.duration_s, 10, 0.01);
   EXPECT_NEAR(report.acceleration_mps2, 9.81, 0.05);
+}
+
+TEST(CheckSamples, MeasuresNoiseAtRest) {
+  const double gyro = 0.0005, acceleration = 0.004;  // densities
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  std::vector<ImuSample> samples = Samples(10);
+  EXPECT_FALSE(CheckSamples(samples).noise) << "it moves";
+  for (int i = 0; i < 12000; ++i) {
+    ImuSample s;
+    s.stamp_s = 60 + i * 0.005;
+    const auto drawn = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+    s.gyro = Eigen::Vector3d(0.01, 0.02, -0.03) + gyro * std::sqrt(200) * drawn();
+    s.acceleration = Eigen::Vector3d(0.2, 0, 9.8) + acceleration * std::sqrt(200) * drawn();
+    samples.push_back(s);
+  }
+  const ImuReport report = CheckSamples(samples);
+  ASSERT_TRUE(report.noise);
+  EXPECT_NEAR(report.noise->rest_s, 60, 1);
+  EXPECT_NEAR(report.noise->gyro_density, gyro, 0.25 * gyro);
+  EXPECT_NEAR(report.noise->acceleration_density, acceleration, 0.25 * acceleration);
+  ASSERT_GE(report.noise->tau_s.size(), 10U);
+  EXPECT_NEAR(report.noise->gyro.front(), gyro * std::sqrt(200), 0.05 * gyro * std::sqrt(200));
 }
 
 TEST(CheckSamples, NamesEachContradictionWithItsRemedy) {

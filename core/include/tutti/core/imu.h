@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <deque>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +29,33 @@ struct ImuCalibration {
   double gyro_random_walk = 0;          ///< of the bias [rad/s^2/sqrt(Hz)]; 0: not known
   double acceleration_noise = 0;        ///< white noise [m/s^2/sqrt(Hz)]; 0: not known
   double acceleration_random_walk = 0;  ///< of the bias [m/s^3/sqrt(Hz)]; 0: not known
+};
+
+/// Measurements on their way from the thread of an IMU's driver to the frames. Safe to use from several
+/// threads.
+class ImuBuffer {
+ public:
+  /// A measurement; those that no frame takes for long are dropped, the oldest first.
+  void Push(const ImuSample& sample) {
+    constexpr std::size_t kMost = 200000;  // minutes
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (samples_.size() == kMost) samples_.pop_front();
+    samples_.push_back(sample);
+  }
+
+  /// Takes out the measurements up to a stamp [s], oldest first: all since the frame before, for
+  /// InputFrame::imu.
+  std::vector<ImuSample> TakeUntil(double stamp_s) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::vector<ImuSample> taken;
+    for (; !samples_.empty() && samples_.front().stamp_s <= stamp_s; samples_.pop_front())
+      taken.push_back(samples_.front());
+    return taken;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::deque<ImuSample> samples_;
 };
 
 }  // namespace tutti

@@ -28,6 +28,7 @@ void BindSlamSystem(py::module_& module);
 void BindTrajectoryCloser(py::module_& module);
 void BindEvaluation(py::module_& module);
 void BindDenseMap(py::module_& module);
+void BindRecording(py::module_& module);
 
 /// Options as keywords: names, types, ranges and sentences are those of the YAML files' keys. Sets what the
 /// keywords say, a struct within as a dict: features of `extraction` is extraction={"features": 300}.

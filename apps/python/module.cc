@@ -148,5 +148,6 @@ PYBIND11_MODULE(_tutti, module) {
   BindTrajectoryCloser(module);
   BindEvaluation(module);
   BindDenseMap(module);
+  BindRecording(module);
   SetSignatures(module);
 }

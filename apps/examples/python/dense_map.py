@@ -11,6 +11,8 @@ import numpy as np
 
 import tutti
 
+if len(sys.argv) != 6:
+    sys.exit(__doc__)
 config, folder, given, mesh_file, grid_folder = sys.argv[1:]
 dataset = tutti.Dataset(folder, tutti.Config(config))
 trajectory = tutti.read_trajectory(given)

@@ -9,6 +9,8 @@ import tutti
 
 
 def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
     reference, *estimates = sys.argv[1:]
     rows = {}
     for estimate in estimates:

@@ -12,6 +12,8 @@ import tutti
 
 
 def main():
+    if len(sys.argv) not in (2, 3):
+        sys.exit(__doc__)
     detector = tutti.LoopDetector(keep_posterior=True)  # SURF, SIFT and ORB, and one Bayes filter on all of them
     results = []
     for frame in tutti.Dataset(sys.argv[1], type="images"):  # or cv2.imread: grey, or colour as it comes

@@ -48,6 +48,8 @@ def whole(grey):
 
 
 def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
     detector = tutti.LoopDetector(members=["orb", "mine", "whole"], external_members=["mine", "whole"],
                                   dense_members=["whole"])
     images = loops = 0

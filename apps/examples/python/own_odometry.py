@@ -12,6 +12,8 @@ import numpy as np
 
 import tutti
 
+if len(sys.argv) != 5:
+    sys.exit(__doc__)
 config, folder, given, out = sys.argv[1:]
 config = tutti.Config(config)
 dataset = tutti.Dataset(folder, config)

@@ -38,11 +38,11 @@ def test_the_posterior_as_a_picture(source, town, tmp_path):
     assert (tmp_path / "posterior.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_slam_on_tum(source, tmp_path):
+def test_slam(source, tmp_path):
     room = tmp_path / "room"
     subprocess.run([os.environ["TUTTI_EXECUTABLE"], "generate", "--out", room, "--sensor", "rgbd", "--world", "room",
                     "--width", "320", "--height", "240", "--frames", "30"], check=True, capture_output=True)
-    said = run(source, "slam_on_tum.py", room / "config.yaml", room, tmp_path / "trajectory.txt")
+    said = run(source, "slam.py", room, tmp_path / "trajectory.txt")
     assert said.startswith("30 of 30 frames")
     assert float(re.search(r"ATE ([\d.]+) m", said)[1]) < 0.05
     assert tutti.read_trajectory(tmp_path / "trajectory.txt").shape == (30, 8)

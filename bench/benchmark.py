@@ -36,18 +36,34 @@ ROWS = {
                           "--supersample", "1", "--kinect-noise"], "routes": [()] * 5},
 }
 
-INTRO = """# What did the ensemble buy?
-
-`./dev bench ensemble --write` writes this file and its data, [docs/results/benchmark.json](docs/results/benchmark.json).
+INTRO = """`./dev bench ensemble --write` writes this file and its data, [docs/results/benchmark.json](docs/results/benchmark.json).
 `tutti compare` runs every variant on an odometry that is tracked once for all of them, so that only the loop closure differs
-([docs/evaluation.md](docs/evaluation.md) has the columns). Ground truth serves the evaluation alone.
+([docs/evaluation.md](docs/evaluation.md) explains the columns). Ground truth serves the evaluation alone.
 
-Every figure is over n runs that differ in what a user's runs differ in: the first frame and image noise on real data, the
-world and its route on generated ones. ATE: mean +- half of the 95 % confidence interval, and the worst run. p: paired t-test
-of the ATE against the ensemble's. Mono is aligned by Sim(3), the rest by SE(3). In `redkitchen` colour and depth are not
-synchronised: differences of ATE below about half a centimetre mean nothing there. Times are in
-[docs/results/timing.md](docs/results/timing.md).
+Each figure is over n runs. On real data the first frame and the image noise vary, on generated data the world and its route. ATE:
+mean +- half of the 95 % confidence interval, and the worst run. p: paired t-test of the ATE against the ensemble's. Mono is aligned
+by Sim(3), the rest by SE(3). In `redkitchen` colour and depth are not synchronised, so that differences of ATE below about half a
+centimetre mean nothing there. `tutti run --timing` prints where the time of a run goes.
 """
+
+
+def summary(whole):
+    """What the ensemble buys and where it does not, in a few lines."""
+    rows = [whole[r]["variants"] for r in ROWS if r in whole]
+
+    def ate(v, name):
+        return v[name]["ate_mean_m"]
+    members, odometry = ("surf", "sift", "orb"), sum(ate(v, "ensemble") < ate(v, "odometry") for v in rows)
+    equal = sum(min(ate(v, m) for m in members) <= 1.02 * ate(v, "ensemble") for v in rows)
+    worse = sum(max(ate(v, m) for m in members) > 1.05 * ate(v, "ensemble") for v in rows)
+    rings = json.loads((table.RESULTS / "closing.json").read_text())["ring"]
+    closed = {m: sum(run[m]["closed"] for run in rings) for m in (*members, "ensemble")}
+    return (f"# What did the ensemble buy?\n\n**Robustness more than accuracy.** Loop closure with the ensemble has a lower ATE than the odometry in "
+            f"{odometry} of {len(rows)} rows below. In {equal} of them the best single member is within 2 % of the ensemble; in {worse}, the "
+            f"worst single member is more than 5 % above it, and which one that is differs from row to row. Where places change it decides whether the "
+            f"map closes: of five rings of corridors by day and at dusk, SURF alone closes {closed['surf']}, SIFT {closed['sift']}, ORB {closed['orb']}, the "
+            f"ensemble {closed['ensemble']} ([closing](docs/results/closing.md)).\n\n**Where it does not help**: where every member finds the loops "
+            "(`kitti_00_head`), and where the odometry hardly drifts (`redkitchen`). It costs the time of three feature extractors.\n")
 
 
 def run_row(name, a):
@@ -143,7 +159,7 @@ def main():
             found[name] = slim(comparison)
             table.put_json(a, "benchmark", found)  # a run that is cut off keeps what it has
     whole = table.put_json(a, "benchmark", found)
-    document = [INTRO, verdict(whole)] + [section(name, whole[name]) for name in ROWS if name in whole]
+    document = [summary(whole), verdict(whole), INTRO] + [section(name, whole[name]) for name in ROWS if name in whole]
     table.put(a, table.ROOT / "BENCHMARK.md", "\n".join(document))
     return 1 if failed else 0
 

@@ -14,9 +14,9 @@ import tempfile
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "bench"))
 import table  # noqa: E402
 
-WORLD = ["--sensor", "mono", "--blocks-x", "2", "--width", "480", "--height", "240", "--laps", "1.25", "--seed", "5"]
-EVERY, MS = 7, 90  # frames of the run for one of the animation, and how long it is shown
-MAP, TRAIL, COLOURS = 240, 4, {"paper": "#ffffff", "point": "#b9c4cf", "path": "#1b6ca8", "camera": "#c8641b", "loop": "#2a8f4f", "track": "#ffd23f"}
+WORLD = ["--sensor", "mono", "--blocks-x", "2", "--width", "400", "--height", "200", "--laps", "1.25", "--seed", "5"]
+EVERY, MS = 8, 110  # frames of the run for one of the animation, and how long it is shown
+MAP, TRAIL, GREYS, COLOURS = 200, 7, 26, {"paper": "#ffffff", "point": "#b9c4cf", "path": "#1b6ca8", "camera": "#c8641b", "loop": "#2a8f4f", "track": "#ffd23f"}
 
 
 def frames(folder):
@@ -26,19 +26,31 @@ def frames(folder):
     run = tutti.run(folder, quiet=True, run={"threads": 2})
     camera, trail = run.dataset.rig.camera, []
     for result in run:
-        if run.frame.index % EVERY or result.T_world_camera is None:
+        if result.T_world_camera is None:
             continue
-        keyframe = run.slam.keyframe(run.slam.keyframe_ids[-1])
-        seen = keyframe.points[keyframe.landmarks >= 0]
-        world = seen @ keyframe.T_world_camera[:3, :3].T + keyframe.T_world_camera[:3, 3]
-        T = np.linalg.inv(result.T_world_camera)
-        p = world @ T[:3, :3].T + T[:3, 3]
-        ids = keyframe.landmarks[keyframe.landmarks >= 0][p[:, 2] > 0.1]
-        p = p[p[:, 2] > 0.1]
-        pixels = dict(zip(ids.tolist(), (p[:, :2] / p[:, 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]).tolist()))
-        trail = (trail + [pixels])[-TRAIL:]
-        loops = [(loop.query_stamp, loop.candidate_stamp) for loop in run.slam.loops if loop.accepted]
-        yield np.array(run.frame.image), list(trail), run.slam.landmarks(), run.slam.trajectory(), loops
+        T = result.T_world_camera
+        # the keyframe that sees most of the same: near, and looking the same way
+        others = tutti.pose_matrices(run.slam.keyframe_trajectory())
+        away = np.linalg.norm(others[:, :3, 3] - T[:3, 3], axis=1) - 20 * np.minimum(0, others[:, :3, 2] @ T[:3, 2] - 0.8)
+        keyframe = run.slam.keyframe(run.slam.keyframe_ids[int(np.argmin(away))])
+        known = keyframe.landmarks >= 0
+        world = keyframe.points[known] @ keyframe.T_world_camera[:3, :3].T + keyframe.T_world_camera[:3, 3]
+        p = (world - T[:3, 3]) @ T[:3, :3]
+        ids, p = keyframe.landmarks[known][p[:, 2] > 0.1], p[p[:, 2] > 0.1]
+        pixels = p[:, :2] / p[:, 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+        trail = (trail + [dict(zip(ids.tolist(), pixels.tolist()))])[-TRAIL:]
+        if run.frame.index % EVERY == 0:
+            loops = [(loop.query_stamp, loop.candidate_stamp) for loop in run.slam.loops if loop.accepted]
+            yield np.array(run.frame.image), list(trail), run.slam.landmarks(), run.slam.trajectory(), loops
+
+
+def palette():
+    """Greys and the colours: frames share them, so that what stays the same costs nothing."""
+    from PIL import Image
+    greys = [round(255 * k / (GREYS - 1)) for k in range(GREYS)]
+    picture = Image.new("P", (1, 1))
+    picture.putpalette([x for g in greys for x in (g, g, g)] + [int(c[i:i + 2], 16) for c in COLOURS.values() for i in (1, 3, 5)] * 3)
+    return picture
 
 
 def drawn(all_frames):
@@ -83,7 +95,7 @@ def main():
     with tempfile.TemporaryDirectory() as work:
         folder = pathlib.Path(work) / "town"
         subprocess.run([build / "apps" / "tutti" / "tutti", "generate", "--out", folder, *WORLD], check=True, stdout=subprocess.DEVNULL)
-        pictures = [picture.quantize(64) for picture in drawn(frames(folder))]
+        pictures = [picture.quantize(palette=palette(), dither=0) for picture in drawn(frames(folder))]
     pictures[0].save(sys.argv[1], save_all=True, append_images=pictures[1:], duration=MS, loop=0, optimize=True)
     print(f"written: {sys.argv[1]}, {len(pictures)} pictures, {pathlib.Path(sys.argv[1]).stat().st_size / 1e6:.1f} MB")
     return 0

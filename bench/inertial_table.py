@@ -89,7 +89,10 @@ def with_blackouts(source, folder):
 def ran(a, dataset, name, *options):
     """ATE [m], frames without a pose, largest error of a step [m], submaps, what the IMU said."""
     folder = a.out / "runs" / name
-    summary = table.run(a, folder, dataset / "config.yaml", dataset, "--no-loops", "--no-map", *options)
+    config = dataset / "config.yaml"
+    if not config.exists():
+        config = table.ROOT / "data" / "configs" / "euroc_stereo.yaml"
+    summary = table.run(a, folder, config, dataset, "--no-loops", "--no-map", *options)
     file = a.out / "errors.json"
     subprocess.run([a.tutti, "evaluate", "--run", folder, "--json", file], check=True, stdout=subprocess.DEVNULL)
     return {"ate": summary["evaluation"]["odometry"]["ate_rmse_m"], "unposed": summary["frames"]["total"] - summary["frames"]["tracked"],

@@ -1,6 +1,6 @@
 // Example 01: loop closure alone. Reads the images of a folder in order and says where the camera was before.
 //
-//   01_loop_closure_on_a_folder DIR
+//   01_loop_closure_on_a_folder [DIR]     # without one: a generated town
 //
 // Three calls: construct a LoopDetector, give it each image, read the result.
 #include <cstdio>
@@ -11,6 +11,7 @@
 
 #include "image_folder.h"
 #include "tutti/loopclosure/detector.h"
+#include "world.h"
 
 namespace {
 
@@ -40,12 +41,12 @@ int Run(const std::string& folder) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: %s DIR\n", argv[0]);
+  if (argc > 2) {
+    std::fprintf(stderr, "usage: %s [DIR]\n", argv[0]);
     return 1;
   }
   try {
-    return Run(argv[1]);
+    return Run(argc > 1 ? argv[1] : examples::Town(argv[0], "mono") + "/image_0");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

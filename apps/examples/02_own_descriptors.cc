@@ -2,7 +2,7 @@
 // is whatever you extract: here corners with a normalised patch of grey values, in your program perhaps a
 // network.
 //
-//   02_own_descriptors DIR
+//   02_own_descriptors [DIR]     # without one: a generated town
 //
 // What it takes: the name in options.external_members, and keypoints with descriptors in each query. A member
 // may also describe an image as a whole, by one vector: "whole" does, a stand-in for a place-recognition
@@ -19,6 +19,7 @@
 
 #include "image_folder.h"
 #include "tutti/loopclosure/detector.h"
+#include "world.h"
 
 namespace {
 
@@ -88,12 +89,12 @@ int Run(const std::string& folder) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: %s DIR\n", argv[0]);
+  if (argc > 2) {
+    std::fprintf(stderr, "usage: %s [DIR]\n", argv[0]);
     return 1;
   }
   try {
-    return Run(argv[1]);
+    return Run(argc > 1 ? argv[1] : examples::Town(argv[0], "mono") + "/image_0");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -1,6 +1,6 @@
 // Example 03: loop closure for another SLAM system, which calls OnKeyframe for each of its keyframes.
 //
-//   03_in_a_slam_keyframe_callback DIR STATE [DEPTH]
+//   03_in_a_slam_keyframe_callback [DIR STATE [DEPTH]]     # without: a generated town; run it twice
 //
 // DIR has the camera's images. STATE is loaded if it is there and saved at the end: the next run goes on
 // where this one stopped, and finds its places again. With DEPTH [m] the "SLAM" knows 3D points (here: a wall
@@ -16,6 +16,7 @@
 
 #include "image_folder.h"
 #include "tutti/loopclosure/detector.h"
+#include "world.h"
 
 namespace {
 
@@ -125,11 +126,12 @@ int Run(const std::string& folder, const std::string& state, double depth) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3 && argc != 4) {
-    std::fprintf(stderr, "usage: %s DIR STATE [DEPTH]\n", argv[0]);
+  if (argc == 2 || argc > 4) {
+    std::fprintf(stderr, "usage: %s [DIR STATE [DEPTH]]\n", argv[0]);
     return 1;
   }
   try {
+    if (argc == 1) return Run(examples::Town(argv[0], "mono") + "/image_0", "example_world/places.tutti", 0);
     return Run(argv[1], argv[2], argc == 4 ? std::stod(argv[3]) : 0.0);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -1,7 +1,8 @@
 // Example 06: a map that outlives its run. Maps the first frames of a folder, saves the map, loads it again
 // as another program would, and says where the other frames were taken.
 //
-//   06_map CONFIG.yaml FOLDER FRAMES MAP.tutti     # the first FRAMES frames are mapped
+//   06_map [CONFIG.yaml FOLDER FRAMES MAP.tutti]     # the first FRAMES frames are mapped; without: a
+//   generated town
 //
 //   find_package(tutti REQUIRED COMPONENTS slam)
 //   target_link_libraries(my_robot PRIVATE tutti::slam)
@@ -22,6 +23,7 @@
 #include "tutti/slam/localizer.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
+#include "world.h"
 
 namespace {
 
@@ -81,12 +83,17 @@ int Run(const std::string& config_file, const std::string& folder, std::size_t f
 }  // namespace
 
 int main(int argc, char** argv) {
+  constexpr std::size_t kLap = 140;  // frames of the generated town
   const auto frames = argc == 5 ? tutti::ParseInteger(argv[3]) : std::nullopt;
-  if (!frames || *frames < 1) {
-    std::fprintf(stderr, "usage: %s CONFIG.yaml FOLDER FRAMES MAP.tutti\n", argv[0]);
+  if (argc != 1 && (!frames || *frames < 1)) {
+    std::fprintf(stderr, "usage: %s [CONFIG.yaml FOLDER FRAMES MAP.tutti]\n", argv[0]);
     return 1;
   }
   try {
+    if (argc == 1) {
+      const std::string town = examples::Town(argv[0], "stereo");
+      return Run(town + "/config.yaml", town, kLap, "example_world/map.tutti");
+    }
     return Run(argv[1], argv[2], static_cast<std::size_t>(*frames), argv[4]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

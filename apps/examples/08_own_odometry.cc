@@ -1,7 +1,7 @@
 // Example 08: loops for the odometry that you already have. Poses come from a file here, as they would from
 // your VIO, wheels or LiDAR; the correction comes out as a robot wants it (map -> odom, REP-105).
 //
-//   08_own_odometry CONFIG.yaml FOLDER ODOMETRY.txt CORRECTED.txt     # both in TUM format
+//   08_own_odometry [CONFIG.yaml FOLDER ODOMETRY.txt CORRECTED.txt]     # both in TUM format; without: a town
 //
 //   find_package(tutti REQUIRED COMPONENTS slam)
 //   target_link_libraries(my_robot PRIVATE tutti::slam)
@@ -17,6 +17,7 @@
 #include "tutti/frontend/dataset.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/trajectory_closer.h"
+#include "world.h"
 
 namespace {
 
@@ -48,12 +49,15 @@ int Run(const std::string& config_file, const std::string& folder, const std::st
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) {
-    std::fprintf(stderr, "usage: %s CONFIG.yaml FOLDER ODOMETRY.txt CORRECTED.txt\n", argv[0]);
+  if (argc != 1 && argc != 5) {
+    std::fprintf(stderr, "usage: %s [CONFIG.yaml FOLDER ODOMETRY.txt CORRECTED.txt]\n", argv[0]);
     return 1;
   }
   try {
-    return Run(argv[1], argv[2], argv[3], argv[4]);
+    if (argc > 1) return Run(argv[1], argv[2], argv[3], argv[4]);
+    const std::string town = examples::Town(argv[0], "stereo"), odometry = "example_world/odometry";
+    examples::Tutti(argv[0], "run " + town + " --no-loops --no-report --quiet --out " + odometry);
+    return Run(town + "/config.yaml", town, odometry + "/trajectory.txt", "example_world/corrected.txt");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -1,7 +1,8 @@
 // Example 09: a mesh and a grid to navigate in, from depth images whose poses are known: of tutti, or of any
 // other program.
 //
-//   09_dense_map CONFIG.yaml FOLDER TRAJECTORY.txt MESH.ply GRID     # poses T_world_body in TUM's format
+//   09_dense_map [CONFIG.yaml FOLDER TRAJECTORY.txt MESH.ply GRID]     # poses T_world_body (TUM); without: a
+//   room
 //
 //   find_package(tutti REQUIRED COMPONENTS dense)                     # reading data sets: COMPONENTS slam,
 //   too target_link_libraries(my_robot PRIVATE tutti::dense)
@@ -16,6 +17,7 @@
 #include "tutti/dense/dense_map.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/slam/config.h"
+#include "world.h"
 
 namespace {
 
@@ -49,12 +51,16 @@ int Run(const std::string& config_file, const std::string& folder, const std::st
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 6) {
-    std::fprintf(stderr, "usage: %s CONFIG.yaml FOLDER TRAJECTORY.txt MESH.ply GRID\n", argv[0]);
+  if (argc != 1 && argc != 6) {
+    std::fprintf(stderr, "usage: %s [CONFIG.yaml FOLDER TRAJECTORY.txt MESH.ply GRID]\n", argv[0]);
     return 1;
   }
   try {
-    return Run(argv[1], argv[2], argv[3], argv[4], argv[5]);
+    if (argc > 1) return Run(argv[1], argv[2], argv[3], argv[4], argv[5]);
+    const std::string room = examples::World(
+        argv[0], "room", "--world room --sensor rgbd --laps 1 --rate 5 --width 320 --height 240");
+    return Run(room + "/config.yaml", room, room + "/groundtruth.txt", "example_world/mesh.ply",
+               "example_world/grid");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
+#include <utility>
 
 #include "core/numbers.h"
 #include "frontend/map/bundle_adjustment.h"
@@ -14,7 +16,39 @@ constexpr std::size_t kMaxPending = 100;  // frames kept to be posed backwards
 constexpr int kMinMatches = 80;
 constexpr std::size_t kMostReferences = 5;
 constexpr double kReferencesApart_s = 0.2;
-constexpr double kLongest_s = 3;  // views that are further apart only get worse
+constexpr double kLongest_s = 3;      // views that are further apart only get worse
+constexpr double kSurely = 30;        // chi-square by which a motion fits better than the reversed one
+constexpr double kLeastNoise = 0.01;  // of a residual's square, in its variances
+
+// Views with little perspective have a second explanation: the camera moved the opposite way, turned so that
+// the mean flow is the same, and what is near is far (Szeliski and Kang, "Shape ambiguities in structure from
+// motion", PAMI 1997). With inverse depths rho and their mean m,
+//   rho' = 2 m - rho,  t' = -t,  R' = Exp(2 m (-t_y, t_x, 0)) R.
+// It is a valley of its own, which an adjustment does not leave.
+TwoViewResult Reversed(const TwoViewResult& view) {
+  std::vector<double> inverse;
+  for (std::size_t i = 0; i < view.points.size(); ++i) {
+    if (view.valid[i]) inverse.push_back(1 / view.points[i].z());
+  }
+  const double mean = internal::Median(std::move(inverse));
+  const Eigen::Vector3d t = view.T_second_first.translation;
+  TwoViewResult out = view;
+  out.T_second_first =
+      Pose(ExpSO3(2 * mean * Eigen::Vector3d(-t.y(), t.x(), 0)) * view.T_second_first.rotation, -t);
+  for (std::size_t i = 0; i < view.points.size(); ++i) {
+    if (!view.valid[i]) continue;
+    const Eigen::Vector3d& p = view.points[i];
+    out.points[i] = p / (p.z() * std::max(0.05 * mean, 2 * mean - 1 / p.z()));
+  }
+  return out;
+}
+
+// Of the two newest keyframes.
+Eigen::Vector3d DirectionOfPair(const Map& map) {
+  const Keyframe &first = map.keyframe(map.KeyframeCount() - 2), &second = map.keyframe(first.id + 1);
+  return (second.T_world_camera.translation - first.T_world_camera.translation).normalized();
+}
+
 }  // namespace
 
 void MonoInitializer::Reset() {
@@ -92,8 +126,17 @@ bool MonoInitializer::Offer(const TrackedFrame& seen, int piece, const Pose& T_w
     return wait("initialising: " + view.reason);
   }
 
-  Map trial = *map;
-  AddPair(frame, piece, T_world_camera, median_depth, matches, view, &trial);
+  // The motion or its reversal, whichever fits better.
+  Map trial = *map, reversed = *map;
+  const auto add = [&](const TwoViewResult& motion, Map* made) {
+    return AddPair(frame, piece, T_world_camera, median_depth, matches, motion, made);
+  };
+  double cost = add(view, &trial), other_cost = add(Reversed(view), &reversed);
+  const bool opposite = DirectionOfPair(trial).dot(DirectionOfPair(reversed)) < 0;
+  if (opposite && other_cost < cost) {
+    std::swap(trial, reversed);
+    std::swap(cost, other_cost);
+  }
   const double sigma_deg = DirectionSigmaOfPair(trial) / internal::kRadians;
   if (!(sigma_deg <= options_.max_direction_sigma_deg)) {
     char text[120];
@@ -103,14 +146,20 @@ bool MonoInitializer::Offer(const TrackedFrame& seen, int piece, const Pose& T_w
     KeepAsReference(frame);
     return wait(text);
   }
+  const auto points = static_cast<double>(std::count(view.valid.begin(), view.valid.end(), 1));
+  const double noise = std::max(kLeastNoise, 2 * cost / std::max(1.0, points - 5));
+  if (opposite && !(2 * (other_cost - cost) > kSurely * noise)) {
+    KeepAsReference(frame);
+    return wait("initialising: the opposite motion fits the two views as well");
+  }
   *map = std::move(trial);
   return true;
 }
 
-// The reference and `frame` as keyframes, with their common landmarks, adjusted.
-void MonoInitializer::AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
-                              double median_depth, const Matches& matches, const TwoViewResult& view,
-                              Map* map) const {
+// The reference and `frame` as keyframes, with their common landmarks, adjusted. Returns the cost.
+double MonoInitializer::AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
+                                double median_depth, const Matches& matches, const TwoViewResult& view,
+                                Map* map) const {
   const TrackedFrame& reference = references_.front().frame;
   std::vector<double> depths;
   for (std::size_t i = 0; i < matches.size(); ++i) {
@@ -141,7 +190,8 @@ void MonoInitializer::AddPair(const TrackedFrame& frame, int piece, const Pose& 
   BundleAdjustmentOptions ba;
   ba.iterations = 20;
   ba.pixel_sigma = options_.pixel_sigma;
-  AdjustWindow(rig_.camera, {b}, {a}, ba, map);
+  const BundleAdjustmentReport report = AdjustWindow(rig_.camera, {b}, {a}, ba, map);
+  return report.usable ? report.final_cost : std::numeric_limits<double>::infinity();
 }
 
 // Of the two newest keyframes; what the adjustment removed no longer counts.

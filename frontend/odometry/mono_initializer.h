@@ -52,8 +52,8 @@ class MonoInitializer {
   TrackedFrame Straight(const TrackedFrame& frame) const;
   Matches FollowReferences(const TrackedFrame& frame);
   void KeepAsReference(const TrackedFrame& frame);
-  void AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera, double median_depth,
-               const Matches& matches, const TwoViewResult& view, Map* map) const;
+  double AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera, double median_depth,
+                 const Matches& matches, const TwoViewResult& view, Map* map) const;
   double DirectionSigmaOfPair(const Map& map) const;
 
   OdometryOptions options_;

@@ -10,7 +10,7 @@ import pathlib
 import re
 import sys
 
-LINES, TESTS = 88700, 49400  # of C++ without tests and bench; of tests
+LINES, TESTS = 88800, 49400  # of C++ without tests and bench; of tests
 SMALL, SMALL_FILES = 40, 70  # files of fewer lines, at most
 METHODS = {  # public ones, at most; constructors, operators and friends apart
     ("frontend/include/tutti/frontend/odometry.h", "Odometry"): 10,

@@ -296,7 +296,7 @@ TEST(MapExample, MapsALapAndLocatesTheNextFramesInIt) {
 
 TEST(MapExample, SaysWhatIsWrong) {
   const std::filesystem::path nothing = testing::FreshFolder() / "nothing";
-  EXPECT_THAT(RunProgramAndSignal(TUTTI_EXAMPLE_06, {}, "", 0).output, HasSubstr("usage: "));
+  EXPECT_THAT(RunProgramAndSignal(TUTTI_EXAMPLE_06, {nothing}, "", 0).output, HasSubstr("usage: "));
   ExpectRefusal(RunProgramAndSignal(TUTTI_EXAMPLE_06, {nothing, nothing, "5", nothing}, "", 0), {nothing});
 }
 

@@ -84,7 +84,7 @@ async function drawRecall(panel) {
 const missingImu = () => (chosen().imu?.moments.length || chosen().imu?.findings.length ? '' : ' ');
 
 // Lines over time: [name, style, values].
-async function drawOverTime(panel, title, unit, t, lines, more = {}) {
+async function drawImuSeries(panel, title, unit, t, lines, more = {}) {
   await chart(panel, 'small', lines.map(([name, style, y]) => ({ type: 'scatter', mode: more.mode ?? 'lines', x: t, y, name, line: { color: style, width: 1.2 }, marker: { color: style, size: 6 } })),
     layoutOf(title, { xaxis: axis('time since the first pose [s]'), yaxis: axis(unit, more.axis), hovermode: 'x unified', showlegend: lines.length > 1 }));
 }
@@ -96,15 +96,15 @@ async function drawImu(panel) {
   for (const finding of imu.findings) panel.append(note(`The IMU was left out: ${finding}`));
   if (imu.turns.length) {
     const t = imu.turns.map((turn) => turn[0]);
-    await drawOverTime(panel, 'Turning, from frame to frame', 'rate [deg/s]', t, [['camera', second, imu.turns.map((turn) => turn[1])], ['gyroscope', first, imu.turns.map((turn) => turn[2])]], zero);
-    await drawOverTime(panel, 'Of that unexplained by the gyroscope', 'angle [deg]', t, [['apart', first, imu.turns.map((turn) => turn[3])]], zero);
+    await drawImuSeries(panel, 'Turning, from frame to frame', 'rate [deg/s]', t, [['camera', second, imu.turns.map((turn) => turn[1])], ['gyroscope', first, imu.turns.map((turn) => turn[2])]], zero);
+    await drawImuSeries(panel, 'Unexplained by the gyroscope', 'angle [deg]', t, [['apart', first, imu.turns.map((turn) => turn[3])]], zero);
   }
   if (imu.moments.length) {
     const t = imu.moments.map((moment) => moment.t);
-    await drawOverTime(panel, "The gyroscope's bias, by the images", 'bias [rad/s]', t, ['x', 'y', 'z'].map((name, k) => [name, [first, second, third][k], imu.moments.map((moment) => moment.bias[k])]));
-    await drawOverTime(panel, 'How late its clock is', 'offset [ms]', t, [['offset', first, imu.moments.map((moment) => moment.offset_ms)]]);
+    await drawImuSeries(panel, "The gyroscope's bias, by the images", 'bias [rad/s]', t, ['x', 'y', 'z'].map((name, k) => [name, [first, second, third][k], imu.moments.map((moment) => moment.bias[k])]));
+    await drawImuSeries(panel, 'How late its clock is', 'offset [ms]', t, [['offset', first, imu.moments.map((moment) => moment.offset_ms)]]);
   }
-  if (imu.tilts.length) await drawOverTime(panel, "Up by the accelerometer, off the map's", 'angle [deg]', imu.tilts.map((tilt) => tilt[0]), [['tilt', first, imu.tilts.map((tilt) => tilt[1])]], { ...zero, mode: 'lines+markers' });
+  if (imu.tilts.length) await drawImuSeries(panel, "Up by the accelerometer, off the map's", 'angle [deg]', imu.tilts.map((tilt) => tilt[0]), [['tilt', first, imu.tilts.map((tilt) => tilt[1])]], { ...zero, mode: 'lines+markers' });
   if (imu.noise) {
     const both = [['gyro', 'gyroscope', 'rad/s'], ['acceleration', 'accelerometer', 'm/s²']];
     for (const [which, name, unit] of both) {

@@ -81,7 +81,8 @@ async function drawRecall(panel) {
   panel.append(note(`${pr.rows_with_loop} of ${pr.images} images have a loop (${pr.rule}). Discs: at the default threshold.`));
 }
 
-const missingImu = () => (chosen().imu?.moments.length || chosen().imu?.findings.length ? '' : ' ');
+const missingImu = () => (chosen().imu?.moments.length || chosen().imu?.findings.length ? ''
+  : 'No IMU: none was beside the images, or it was left out (--no-imu), or the camera hardly turned.');
 
 // Lines over time: [name, style, values].
 async function drawImuSeries(panel, title, unit, t, lines, more = {}) {

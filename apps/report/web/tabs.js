@@ -54,7 +54,7 @@ async function drawOverview(panel) {
   for (const finding of run.findings) panel.append(note(`The calibration can't be right: ${finding}`));
   for (const failure of data.failures ?? []) panel.append(note(`Failed: ${failure}`));
   // Several tabs may lack the same thing.
-  for (const missing of new Set(TABS.map(([, , , why]) => why()).filter((why) => why.trim()))) panel.append(note(missing));
+  for (const missing of new Set(TABS.map(([, , , why]) => why()).filter((why) => why))) panel.append(note(missing));
   if (!missingMap()) await drawTopChart(panel, '');
   const loops = run.loops.filter((loop) => loop.outcome !== 'missed');
   if (loops.length) {

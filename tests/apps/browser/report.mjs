@@ -86,7 +86,7 @@ async function lookOnce(browser, file, [look, viewport, scheme], expected, words
   await page.waitForFunction(() => document.documentElement.dataset.ready === '1', { timeout: 120000 });
   const [tabs, hidden] = await page.evaluate(() => [false, true].map((hidden) =>
     [...document.querySelectorAll('[role=tab]')].filter((tab) => tab.hidden === hidden).map((tab) => tab.id.slice(4))));
-  check(tabs.length + hidden.length === 9, `${file}: 9 tabs, not ${tabs.length} and ${hidden.length} without anything to show`);
+  check(tabs.length + hidden.length === 10, `${file}: 10 tabs, not ${tabs.length} and ${hidden.length} without anything to show`);
   for (const tab of expected) check(tabs.includes(tab), `${file}: no tab ${tab}`);
   for (const tab of tabs) {
     await openTab(page, tab);
@@ -104,7 +104,7 @@ async function lookOnce(browser, file, [look, viewport, scheme], expected, words
     if (tab !== 'configuration' && tab !== 'overview') check(found.charts.length + found.images.length > 0, `${where}: nothing drawn`);
     if (tab === 'overview') {
       check(found.charts.length === (tabs.includes('map') ? 1 : 0), `${where}: no map`);
-      if (hidden.length) check(/\bNo (map|errors|precision|posterior|gallery)/.test(await page.evaluate(() => document.getElementById('overview').innerText)), `${where}: does not say why there is no ${hidden}`);
+      if (hidden.length) check(/\bNo (map|errors|precision|posterior|gallery|IMU)/.test(await page.evaluate(() => document.getElementById('overview').innerText)), `${where}: does not say why there is no ${hidden}`);
     }
     if (tab === 'posterior' && look !== 'phone') {
       const { first, rest } = await beliefMaps(page);

@@ -89,8 +89,8 @@ TransformRows RowsOf(const Pose& T) {
   return rows;
 }
 
-// How the IMU is mounted; `camera_key` is T_camera_imu, `imu_key` T_imu_camera, if either is there. Image times
-// plus `shift_key` are the IMU's.
+// How the IMU is mounted; `camera_key` is T_camera_imu, `imu_key` T_imu_camera, if either is there. Image
+// times plus `shift_key` are the IMU's.
 void TakeImu(const CalibrationKeys& keys, const char* camera_key, const char* imu_key, const char* shift_key,
              Calibration& out) {
   if (const KeyValue T = keys.Find({camera_key}))

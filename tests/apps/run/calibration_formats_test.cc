@@ -307,7 +307,8 @@ TEST(CalibrationFormats, TellsHowTheImuIsMountedAndItsClock) {
        {"cam0: {T_cam_imu: " + rows + ", timeshift_cam_imu: 0.02, " + cam,
         "cam0: {T_imu_cam: " + inverse + ", timeshift_cam_imu: 0.02, " + cam, slam + "IMU.T_b_c1: " + inverse,
         slam + "Tbc: {rows: 4, cols: 4, dt: f, data: " + inverse + "}\n",
-        std::string(R"({"value0": {"cam_time_offset_ns": 20000000, "T_imu_cam": [{"px": 0.08, "py": 0, "pz": 0.06,
+        std::string(
+            R"({"value0": {"cam_time_offset_ns": 20000000, "T_imu_cam": [{"px": 0.08, "py": 0, "pz": 0.06,
            "qx": 0, "qy": -0.6, "qz": 0, "qw": 0.8}], "intrinsics": [{"camera_type": "pinhole", "intrinsics":
            {"fx": 590, "fy": 591, "cx": 150, "cy": 120}}], "resolution": [[320, 240]]}})")}) {
     const Calibration c = ReadText(file);

@@ -10,8 +10,8 @@
 // certifiable estimation with preconditioned eigensolvers", RA-L 2022); Lanczos would bound lambda_min from
 // the wrong side. Where it is negative, L comes from the relaxation, in which rotations may leave space
 // (Riemannian staircase, ibid. section 4.2), and is lowered along the lowest eigenvectors until little of eta
-// is left. The bound holds for all rotations and translations, of whatever rank, and wherever L comes from; it
-// is one of the chordal objective (pose_graph_optimizer.h) with all weights 1, not of chi2.
+// is left. The bound holds for all rotations and translations, of whatever rank, and wherever L comes from;
+// it is one of the chordal objective (pose_graph_optimizer.h) with all weights 1, not of chi2.
 #pragma once
 
 #include <functional>

@@ -36,6 +36,7 @@ std::vector<Tilt> TiltsOf(const Map& map, const ImuReport& imu, const Similarity
   std::map<std::int64_t, int> keyframe_of_frame;
   for (const int id : map.KeyframeIds()) keyframe_of_frame[map.keyframe(id).frame_index] = id;
   std::vector<Tilt> tilts;
+  if (keyframe_of_frame.empty()) return tilts;
   for (const ImuTilt& tilt : imu.tilts) {
     auto at = keyframe_of_frame.lower_bound(tilt.frame);
     if (at == keyframe_of_frame.end()) --at;

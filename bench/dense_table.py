@@ -206,13 +206,7 @@ def main():
     a = table.parse(parser, ROWS)
     if np is None:
         parser.error(f"{MISSING}; Debian: apt-get install python3-open3d python3-scipy python3-pil")
-    made = {}
-    for name in a.rows:  # each is kept as soon as it is there
-        made = table.put_json(a, "dense", {name: list(ROWS[name](a))})
-    lines = ["# Dense maps", "", "Median of three worlds, the worst in brackets. `./dev bench dense --write`.", "",
-             "| what | measured | bound |", "|---|---|---|"]
-    lines += [f"| {' | '.join(row)} |" for name in ROWS for row in made.get(name, [])]
-    table.put(a, table.RESULTS / "dense.md", "\n".join(lines))
+    table.put_rows(a, "dense", ROWS, "Dense maps", "Median of three worlds, the worst in brackets. `./dev bench dense --write`.")
 
 
 if __name__ == "__main__":

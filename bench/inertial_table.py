@@ -108,7 +108,7 @@ def checked(a, dataset, poses):
 
     def last(pattern):
         return [float(x) for x in re.findall(pattern, text)[-1].split()] if re.search(pattern, text) else [float("nan")]
-    return {"step_deg": last(r"leaves ([\d.]+) deg a step")[0], "bias": last(r"bias ([-\d. ]+) rad/s"), "mounting_deg": last(r"([\d.]+) deg from the calibration")[0]}
+    return {"step_deg": last(r"leaves ([\d.]+) deg a step")[0], "mounting_deg": last(r"([\d.]+) deg from the calibration")[0]}
 
 
 def named(run):
@@ -218,13 +218,7 @@ def main():
     a = table.parse(table.parser(__doc__, "inertial", ROWS), ROWS)
     if not (a.data / "euroc_imu").exists():
         sys.exit(f"inertial: {a.data / 'euroc_imu'} is absent")
-    made = {}
-    for name in a.rows:  # each is kept as soon as it is there
-        made = table.put_json(a, "inertial", {name: list(ROWS[name](a))})
-    lines = ["# Inertial sensors", "", "Flights of EuRoC, rendered along their true poses, with their real IMU. `./dev bench inertial --write`.", "",
-             "| what | measured | bound |", "|---|---|---|"]
-    lines += [f"| {' | '.join(row)} |" for name in ROWS for row in made.get(name, [])]
-    table.put(a, table.RESULTS / "inertial.md", "\n".join(lines))
+    table.put_rows(a, "inertial", ROWS, "Inertial sensors", "Flights of EuRoC, rendered along their true poses, with their real IMU. `./dev bench inertial --write`.")
 
 
 if __name__ == "__main__":

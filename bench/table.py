@@ -89,6 +89,17 @@ def put_json(a, name, rows):
     return whole
 
 
+def put_rows(a, name, rows, title, intro):
+    """Measures the rows that are asked for (name: function of `a` that gives (what, measured, bound)), each kept as soon as it is
+    there, and puts all of them into docs/results/NAME.md."""
+    made = {}
+    for row in a.rows:
+        made = put_json(a, name, {row: list(rows[row](a))})
+    lines = [f"# {title}", "", intro, "", "| what | measured | bound |", "|---|---|---|"]
+    lines += [f"| {' | '.join(line)} |" for row in rows for line in made.get(row, [])]
+    put(a, RESULTS / f"{name}.md", "\n".join(lines))
+
+
 def shown(path):
     return path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
 

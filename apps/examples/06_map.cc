@@ -1,8 +1,9 @@
 // Example 06: a map that outlives its run. Maps the first frames of a folder, saves the map, loads it again
 // as another program would, and says where the other frames were taken.
 //
-//   06_map [CONFIG.yaml FOLDER FRAMES MAP.tutti]     # the first FRAMES frames are mapped; without: a
-//   generated town
+//   06_map [CONFIG.yaml FOLDER FRAMES MAP.tutti]     # the first FRAMES frames are mapped
+//
+// Without arguments it takes a generated town.
 //
 //   find_package(tutti REQUIRED COMPONENTS slam)
 //   target_link_libraries(my_robot PRIVATE tutti::slam)

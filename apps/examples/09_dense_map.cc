@@ -1,8 +1,9 @@
 // Example 09: a mesh and a grid to navigate in, from depth images whose poses are known: of tutti, or of any
 // other program.
 //
-//   09_dense_map [CONFIG.yaml FOLDER TRAJECTORY.txt MESH.ply GRID]     # poses T_world_body (TUM); without: a
-//   room
+//   09_dense_map [CONFIG.yaml FOLDER TRAJECTORY.txt MESH.ply GRID]
+//
+// Poses are T_world_body in TUM's format. Without arguments it takes a generated room.
 //
 //   find_package(tutti REQUIRED COMPONENTS dense)                     # reading data sets: COMPONENTS slam,
 //   too target_link_libraries(my_robot PRIVATE tutti::dense)

@@ -30,6 +30,9 @@ void BindEvaluation(py::module_& module);
 void BindDenseMap(py::module_& module);
 void BindRecording(py::module_& module);
 
+/// Throws InputError that names `function` and the words that there are.
+Sensor SensorNamed(const std::string& function, const std::string& name);
+
 /// Options as keywords: names, types, ranges and sentences are those of the YAML files' keys. Sets what the
 /// keywords say, a struct within as a dict: features of `extraction` is extraction={"features": 300}.
 /// `section`: of the YAML files that they are keys of; empty: keywords are whole sections. Raises TypeError

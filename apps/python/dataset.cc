@@ -55,13 +55,7 @@ CameraRig MakeRig(const PinholeCamera& camera, const std::string& sensor, double
                   const py::object& T_camera_imu) {
   CameraRig rig;
   rig.camera = camera;
-  bool known = false;
-  std::vector<std::string> words;
-  for (const auto& [word, value] : WordsOf(Sensor())) {
-    if (sensor == word) rig.sensor = value, known = true;
-    words.emplace_back(word);
-  }
-  if (!known) throw InputError("Rig: sensor: '" + sensor + "' is not one of " + JoinText(words));
+  rig.sensor = SensorNamed("Rig", sensor);
   if (camera.distortion != Distortion::kNone)
     throw InputError("Rig: images must be rectified, so the camera can have no distortion");
   rig.baseline_m = baseline_m;
@@ -285,6 +279,15 @@ void BindDataset(py::module_& module) {
       .def_property_readonly(
           "warnings", [](const Reader& reader) { return reader.dataset().Warnings(); },
           doc::Dataset_Warnings);
+}
+
+Sensor SensorNamed(const std::string& function, const std::string& name) {
+  std::vector<std::string> words;
+  for (const auto& [word, value] : WordsOf(Sensor())) {
+    if (name == word) return value;
+    words.emplace_back(word);
+  }
+  throw InputError(function + ": sensor: '" + name + "' is not one of " + JoinText(words));
 }
 
 }  // namespace tutti::python

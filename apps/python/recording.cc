@@ -20,25 +20,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::optional<Sensor> SensorOf(const std::optional<std::string>& name) {
-  if (!name) return std::nullopt;
-  std::vector<std::string> words;
-  for (const auto& [word, value] : WordsOf(Sensor())) {
-    if (*name == word) return value;
-    words.emplace_back(word);
-  }
-  throw InputError("sensor: '" + *name + "' is not one of " + JoinText(words));
-}
-
 // Where nothing says what the focal length is, the images may; the sentence says what came of it.
 std::string MeasureLens(const fs::path& dataset, Recording* recording) {
-  if (IsCamera(dataset.string())) return "camera  focal length guessed: live frames can't be measured before";
+  if (IsCamera(dataset.string())) return "focal length guessed: live frames can't be measured before";
   const FocalLength found = MeasureFocalLength(dataset, recording->config);
-  if (!found.measured) return "camera  focal length guessed: in the first frames " + found.reason;
-  recording->config.dataset.camera = found.camera;
-  return "camera  focal length measured on " + std::to_string(found.frames) +
-         " frames: " + std::to_string(found.camera.fx) + " px, give or take " +
-         std::to_string(100 * found.sigma) + " %";
+  if (found.measured) recording->config.dataset.camera = found.camera;
+  return FocalLengthText(found, recording->photo_lens);
 }
 
 std::pair<RunConfig, std::vector<std::string>> Recognised(
@@ -48,7 +35,7 @@ std::pair<RunConfig, std::vector<std::string>> Recognised(
   request.calibration = calibration;
   request.camera = camera;
   request.view_deg = fov;
-  request.sensor = SensorOf(sensor);
+  if (sensor) request.sensor = SensorNamed("recognise", *sensor);
   RunConfig asked;
   SetOptions("recognise", "", sections, asked);
   request.depth_units_per_m = asked.dataset.depth_units_per_m;
@@ -56,7 +43,7 @@ std::pair<RunConfig, std::vector<std::string>> Recognised(
   SetOptions("recognise", "", sections, recording.config);
   if (recording.guessed_lens) {
     const py::gil_scoped_release release;
-    recording.findings.push_back(MeasureLens(dataset, &recording));
+    recording.findings.push_back("camera  " + MeasureLens(dataset, &recording));
   }
   return {recording.config, recording.findings};
 }

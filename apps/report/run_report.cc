@@ -256,8 +256,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["variant"] = variant;
   json["dataset"] = result.dataset;
   json["seed"] = result.config.loops.seed;
-  const bool has_metres =
-      scored || (result.imu && result.imu->metres > 0 && result.imu->metres_sigma < kMostScaleSigma);
+  const bool has_metres = scored || (result.imu && result.imu->KnowsMetres());
   json["unit"] = result.rig.sensor == Sensor::kMono && !has_metres ? "map units" : "m";
   json["figures"] = FiguresJson(result);
   json["findings"] = Json::array();

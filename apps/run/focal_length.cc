@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -151,7 +152,7 @@ Fit Adjust(Scene& scene) {
 
 // Keyframes in a row between which the camera turns most.
 std::vector<int> WhereItTurns(const Odometry& odometry, const FrameRange& session) {
-  const std::vector<int> keyframes = KeyframesOfLargestSubmap(odometry, session);
+  std::vector<int> keyframes = KeyframesOfLargestSubmap(odometry, session);
   if (keyframes.size() <= kCheckedKeyframes) return keyframes;
   std::vector<double> turned = {0};  // up to each keyframe
   for (std::size_t k = 1; k < keyframes.size(); ++k) {
@@ -444,6 +445,18 @@ FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session, d
     result.reason = scene ? "the motion does not tell the focal length" : "the map is too small";
   result.cpu_s = ProcessCpuSeconds() - cpu_begin;
   return result;
+}
+
+std::string FocalLengthText(const FocalLength& found, const std::string& photo_lens) {
+  char text[300];
+  if (found.measured) {
+    std::snprintf(text, sizeof text, "focal length measured on %d frames: %.1f px, give or take %.1f %%",
+                  found.frames, found.camera.fx, 100 * found.sigma);
+    return text;
+  }
+  std::snprintf(text, sizeof text, "guessed, %.1f px", found.camera.fx);
+  return "focal length " + (photo_lens.empty() ? text : photo_lens) + ": in the first " +
+         std::to_string(found.frames) + " frames " + found.reason;
 }
 
 LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {

@@ -469,7 +469,7 @@ std::string ResultTable(const RunResult& r) {
     out << "  the IMU agrees with the images to " << Cell(r.imu->residual_deg, 3)
         << " deg from frame to frame, its clock is off by " << Cell(1000 * r.imu->time_offset_s, 1) << " ms";
     if (r.imu->up) out << "; the world's z axis points up, to " << Cell(r.imu->up_sigma_deg, 2) << " deg";
-    if (r.imu->metres > 0 && r.imu->metres_sigma < kMostScaleSigma)
+    if (r.imu->KnowsMetres())
       out << "; its unit is the metre, to " << Cell(100 * r.imu->metres_sigma, 1) << " %";
     out << "\n";
   }

@@ -207,7 +207,7 @@ void SlamRun::Collect() {
   if (!alone_) return;
   const Odometry& alone = alone_->Tracked();
   Trajectory poses = FrameTrajectory(alone.map(), -1, session);
-  if (const std::optional<Similarity> upright = UprightTurn(alone)) {  // as that of the map
+  if (const std::optional<Similarity> upright = UprightTurn(alone.Report().imu)) {  // as that of the map
     for (StampedPose& pose : poses)
       pose.pose = Pose(upright->rotation * pose.pose.rotation, *upright * pose.pose.translation);
   }

@@ -133,11 +133,9 @@ std::map<int, Similarity> InFrameOf(const Map& first, int first_keyframe, const 
   return S_first_keyframe;
 }
 
-std::optional<Similarity> UprightTurn(const Odometry& odometry) {
-  const std::optional<ImuReport> imu = odometry.Report().imu;
+std::optional<Similarity> UprightTurn(const std::optional<ImuReport>& imu) {
   if (!imu || !imu->up) return std::nullopt;
-  const bool knows_metres = imu->metres > 0 && imu->metres_sigma < kMostScaleSigma;
-  return Similarity(knows_metres ? imu->metres : 1,
+  return Similarity(imu->KnowsMetres() ? imu->metres : 1,
                     Eigen::Quaterniond::FromTwoVectors(*imu->up, Eigen::Vector3d::UnitZ()),
                     Eigen::Vector3d::Zero());
 }

@@ -8,7 +8,6 @@
 #include "tutti/core/pose.h"
 #include "tutti/frontend/imu.h"
 #include "tutti/frontend/map.h"
-#include "tutti/frontend/odometry.h"
 
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
@@ -21,7 +20,7 @@ std::map<int, Similarity> InFrameOf(const Map& first, int first_keyframe, const 
 
 /// The rotation that turns an odometry's world so that its z axis points up; of one camera with the scale
 /// that makes metres of its unit, if an IMU knows it to 2 %. None: no IMU knows where up is.
-std::optional<Similarity> UprightTurn(const Odometry& odometry);
+std::optional<Similarity> UprightTurn(const std::optional<ImuReport>& imu);
 
 /// The keyframes of a map whose z axis points up. Where the map has bent, so that what the accelerometer says
 /// of up differs from one part of it to another by more than it scatters, the pose graph `graph` of the map

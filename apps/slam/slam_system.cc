@@ -237,13 +237,14 @@ class SlamSystem::Impl {
   // it.
   void StandUpright() {
     constexpr double kUpright = 0.002;  // it is, no matter what a loop more says [rad], [1]
-    const std::optional<Similarity> turn = UprightTurn(*odometry_);
+    const std::optional<ImuReport> imu = odometry_->Report().imu;
+    const std::optional<Similarity> turn = UprightTurn(imu);
     if (!turn) return;
     const bool is = turn->rotation.angularDistance(Eigen::Quaterniond::Identity()) < kUpright &&
                     std::abs(turn->scale - 1) < kUpright;
     if (is) return;
     const Map& map = odometry_->map();
-    MapMerge::MoveAll(Upright(map, *odometry_->Report().imu, *turn, loops_.Graph(map)), &loops_, &*odometry_);
+    MapMerge::MoveAll(Upright(map, *imu, *turn, loops_.Graph(map)), &loops_, &*odometry_);
   }
 
   // What is due by now.

@@ -163,17 +163,9 @@ void MeasureGuess(const RunArguments& arguments, Recording& recording, RunReques
   if (request.stride) range.dataset.stride = *request.stride;
   const FocalLength found = MeasureFocalLength(arguments.dataset, range);
   request.focal_length = found;
-  if (found.measured) {
-    recording.config.dataset.camera = found.camera;
-    request.camera_source = Formatted("focal length measured on %d frames: %.1f px, give or take %.1f %%",
-                                      found.frames, found.camera.fx, 100 * found.sigma);
-  } else {
-    request.camera_guessed = recording.photo_lens.empty();
-    const std::string source =
-        request.camera_guessed ? Formatted("guessed, %.1f px", found.camera.fx) : recording.photo_lens;
-    request.camera_source = Formatted("focal length %s: in the first %d frames %s", source.c_str(),
-                                      found.frames, found.reason.c_str());
-  }
+  if (found.measured) recording.config.dataset.camera = found.camera;
+  request.camera_guessed = !found.measured && recording.photo_lens.empty();
+  request.camera_source = FocalLengthText(found, recording.photo_lens);
   say(request.camera_source);
 }
 

@@ -52,9 +52,6 @@ struct ImuNoise {
   double acceleration_density = 0;   ///< the same [m/s^2/sqrt(Hz)]
 };
 
-/// ImuReport::metres is used below this standard deviation.
-inline constexpr double kMostScaleSigma = 0.02;
-
 /// Result of an examination. Zeros: not measured.
 struct ImuReport {
   std::uint64_t samples = 0;
@@ -87,6 +84,9 @@ struct ImuReport {
   std::vector<ImuTilt> tilts;                                   ///< every second
   double metres = 0;        ///< one camera: that the unit of its map has; 0: not known
   double metres_sigma = 0;  ///< standard deviation, as a share of it [1]
+
+  /// The map's unit is known well enough to be used, to 2 %.
+  bool KnowsMetres() const { return metres > 0 && metres_sigma < 0.02; }
 
   bool trusted = false;              ///< it agrees with the camera, and its mounting and offset are known
   std::vector<ImuFinding> findings;  ///< empty: nothing speaks against it
